@@ -1,0 +1,2 @@
+//! pliant: flexible multibody dynamics with the load at every hinge.
+pub mod model;

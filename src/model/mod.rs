@@ -1,0 +1,2 @@
+//! What a system is: bodies, hinges and the modal data they carry.
+pub mod modal_body;
