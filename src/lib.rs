@@ -1,2 +1,3 @@
 //! pliant: flexible multibody dynamics with the load at every hinge.
 pub mod model;
+pub mod spatial;
