@@ -315,13 +315,7 @@ impl Hinge {
     pub fn applied_force(&self, t: f64, q: &[f64], v: &[f64], out: &mut [f64]) {
         out.fill(0.0);
         if !self.stiffness.is_empty() {
-            let mut displacement = [0.0; MAX_RATES];
-            let displacement = &mut displacement[..out.len()];
-            self.kind.displacement(q, displacement);
-            for (i, o) in out.iter_mut().enumerate() {
-                *o = -self.stiffness[i] * (displacement[i] - self.rest.get(i).copied().unwrap_or(0.0));
-            }
-            self.kind.force_on_rates(q, displacement, out);
+            out.copy_from_slice(&self.spring_force(q)[..out.len()]);
         }
         for (o, (c, v)) in out.iter_mut().zip(self.damping.iter().zip(v)) {
             *o -= c * v;
@@ -331,6 +325,19 @@ impl Hinge {
                 *o += torque.value(t, i);
             }
         }
+    }
+
+    /// Force of the springs on each rate; zero without springs and past the rate count.
+    #[must_use]
+    pub fn spring_force(&self, q: &[f64]) -> [f64; MAX_RATES] {
+        let (mut force, mut displacement) = ([0.0; MAX_RATES], [0.0; MAX_RATES]);
+        let displacement = &mut displacement[..self.kind.rate_count()];
+        self.kind.displacement(q, displacement);
+        for (i, k) in self.stiffness.iter().enumerate() {
+            force[i] = -k * (displacement[i] - self.rest.get(i).copied().unwrap_or(0.0));
+        }
+        self.kind.force_on_rates(q, displacement, &mut force[..displacement.len()]);
+        force
     }
 
     /// Energy (J) in the springs at `q`.

@@ -1,0 +1,121 @@
+//! Inertia `M_fl(eta)` and velocity terms `b_fl` of a flexible body from its modal integrals: nothing here depends on the mesh.
+//!
+//! With `x = r + sum_k eta_k phi_k` and `W_j,ab = int rho phi_ja x_b`:
+//! `M_ff = 1`, `M_fv = p_j`, `M_fw row j = int rho x x phi_j` (antisymmetric part of W),
+//! `m c(eta) = m c + sum p_j eta_j`, `J(eta)` from `int rho x x'`; and the node accelerations `omega x (omega x x) + 2 omega x u_dot`
+//! integrated with 1, x and phi_j give b. Source: DESIGN of the project, section 3.1; checked against nodal sums in the tests.
+#![expect(non_snake_case, reason = "symbols follow the table in dynamics/mod.rs")]
+
+use crate::model::flexible_body::{InertiaOrder, ModalIntegrals, TENSOR};
+use crate::spatial::SpatialInertia;
+use crate::spatial::shift::spatial;
+use nalgebra::{Matrix3, Vector3, Vector6};
+
+/// Inertia of a flexible body at its present deformation.
+#[derive(Debug, Clone)]
+pub struct FlexibleInertia {
+    /// Rigid rows: mass, `m c(eta)`, `J(eta)` about the body origin.
+    pub rigid: SpatialInertia,
+    /// `m c(eta)` (kg m).
+    pub first_moment: Vector3<f64>,
+    /// `J(eta)` (kg m^2).
+    pub inertia: Matrix3<f64>,
+    /// Rows j of M_fr: (angular; linear).
+    pub row: Vec<Vector6<f64>>,
+    /// Nine planes of n: `W_j,ab` at `(3 a + b) * n + j`.
+    W: Vec<f64>,
+}
+
+impl FlexibleInertia {
+    /// Room for n modes.
+    #[must_use]
+    pub fn new(n: usize) -> Self {
+        Self {
+            rigid: SpatialInertia::default(),
+            first_moment: Vector3::zeros(),
+            inertia: Matrix3::zeros(),
+            row: vec![Vector6::zeros(); n],
+            W: vec![0.0; TENSOR * n],
+        }
+    }
+
+    /// Evaluates the inertia at the modal coordinates `eta`.
+    pub fn evaluate(&mut self, integrals: &ModalIntegrals, order: InertiaOrder, eta: &[f64]) {
+        let n = integrals.mode_count();
+        self.W.copy_from_slice(&integrals.shape_position);
+        if order >= InertiaOrder::First {
+            for (w, p) in self.W.chunks_exact_mut(n).zip(integrals.shape_shape.chunks_exact(n * n)) {
+                add_product(p, eta, w);
+            }
+        }
+        let mut first_moment = integrals.first_moment;
+        let mut second_moment = integrals.second_moment;
+        if order >= InertiaOrder::First {
+            for (p, e) in integrals.momentum.iter().zip(eta) {
+                first_moment += p * *e;
+            }
+            let sum = |planes: &[f64]| Matrix3::from_fn(|a, b| dot(&planes[(3 * a + b) * n..][..n], eta));
+            let undeformed = sum(&integrals.shape_position).transpose();
+            let other = if order == InertiaOrder::Second { sum(&self.W) } else { undeformed.transpose() };
+            second_moment += undeformed + other;
+        }
+        self.first_moment = first_moment;
+        self.inertia = Matrix3::from_diagonal_element(second_moment.trace()) - second_moment;
+        self.inertia = (self.inertia + self.inertia.transpose()) * 0.5;
+        self.rigid = SpatialInertia::rigid(integrals.mass, &self.first_moment, &self.inertia);
+        let W = |a: usize, b: usize, j: usize| self.W[(3 * a + b) * n + j];
+        for j in 0..n {
+            let angular = Vector3::new(W(2, 1, j) - W(1, 2, j), W(0, 2, j) - W(2, 0, j), W(1, 0, j) - W(0, 1, j));
+            let rotary = integrals.rotary.get(j).copied().unwrap_or_default();
+            self.row[j] = spatial(&(angular + rotary), &integrals.momentum[j]);
+        }
+    }
+
+    /// Velocity terms for angular velocity `omega` (body axes) and modal rates: returns the rigid rows of b, writes the modal rows.
+    pub fn velocity_terms(
+        &self,
+        integrals: &ModalIntegrals,
+        order: InertiaOrder,
+        omega: &Vector3<f64>,
+        eta_dot: &[f64],
+        b_modal: &mut [f64],
+    ) -> Vector6<f64> {
+        let n = integrals.mode_count();
+        // D_ab = int rho u_dot_a x_b
+        let D = Matrix3::from_fn(|a, b| dot(&self.W[(3 * a + b) * n..][..n], eta_dot));
+        let momentum: Vector3<f64> = integrals.momentum.iter().zip(eta_dot).map(|(p, e)| p * *e).sum();
+        let moment = omega.cross(&(self.inertia * omega)) + (omega * D.trace() - D * omega) * 2.0;
+        let force = omega.cross(&omega.cross(&self.first_moment)) + omega.cross(&momentum) * 2.0;
+        // (omega omega' - omega^2) : W_j
+        let square = omega.norm_squared();
+        b_modal.fill(0.0);
+        for a in 0..3 {
+            for b in 0..3 {
+                let factor = omega[a] * omega[b] - if a == b { square } else { 0.0 };
+                let plane = &self.W[(3 * a + b) * n..][..n];
+                b_modal.iter_mut().zip(plane).for_each(|(o, w)| *o += factor * w);
+            }
+        }
+        if order >= InertiaOrder::First {
+            for (c, plane) in integrals.shape_cross.chunks_exact((n * n).max(1)).enumerate() {
+                for (k, rate) in eta_dot.iter().enumerate() {
+                    let factor = 2.0 * omega[c] * rate;
+                    b_modal.iter_mut().zip(&plane[k * n..][..n]).for_each(|(o, p)| *o += factor * p);
+                }
+            }
+        }
+        spatial(&moment, &force)
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// `out += P x` for a column-contiguous square plane.
+fn add_product(plane: &[f64], x: &[f64], out: &mut [f64]) {
+    let n = out.len();
+    for (column, x) in plane.chunks_exact(n).zip(x) {
+        out.iter_mut().zip(column).for_each(|(o, p)| *o += p * x);
+    }
+}

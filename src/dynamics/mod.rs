@@ -1,0 +1,132 @@
+//! Forward dynamics of trees of rigid and flexible bodies by the split articulated-body (ATBI) recursion, and the hinge loads that
+//! fall out of it.
+//!
+//! # The recursion
+//!
+//! Every flexible body k is split (Paper section 3.0.1) into the flexible body k, which owns mass, modes and the frame B of its modal
+//! file, and a massless virtual rigid body k', which owns the hinge and sits at O. A rigid body is its own k'. One evaluation
+//! is five sweeps over bodies that are stored parents first:
+//!
+//! 1. [`sweep::pose_outward`]: hinge maps, relative poses, mode shapes where bodies are joined;
+//! 2. [`sweep::velocity_outward`]: velocities, bias accelerations `a`, gyroscopic forces `b`;
+//! 3. [`sweep::inertia_inward`]: articulated inertias `P`, gains `G`, Eq. 32 and 33;
+//! 4. [`sweep::force_inward`]: residual forces `z`, innovations, Eq. 34 and 35;
+//! 5. [`sweep::acceleration_outward`]: accelerations, Eq. 36 to 41;
+//!
+//! and, only where something asks, [`hinge_load`]: `f(k') = P+ alpha+ + z+`, Eq. 18 and 38.
+//!
+//! # Symbols
+//!
+//! | Paper | here | meaning | shape |
+//! |---|---|---|---|
+//! | phi(k, j) | `l`, through `spatial::shift` | shift between origins | 3 |
+//! | H | `map` | hinge map, one row per rate, O axes | m x 6 |
+//! | V, alpha | `V`, `alpha` | spatial velocity, acceleration | 6 |
+//! | a | `a`, `a_inboard` | bias acceleration at k', at k | 6 |
+//! | b_fl | `b`, `b_modal` | gyroscopic force: rigid rows, modal rows | 6, n |
+//! | M_fl | `FlexibleInertia` | inertia of the flexible body: 1, `row`, `rigid` | (n+6) x (n+6) |
+//! | Pi(O+), Pi_B(O) | `shape`, `shape_inboard` | mode shape where a child, the parent is joined | 6 x n |
+//! | P, P+ | `P`, `P_plus` | articulated inertia before, after the hinge | 6 x 6 |
+//! | mu, D_fl, E = D_fl^-1 mu* | `mu`, `modal_block`, `gain_modal` | modal elimination, Eq. 32 | 6 x n, n x n, n x 6 |
+//! | D, G | `D`, `G` | hinge inertia, Kalman gain | m x m, 6 x m |
+//! | z, z+ | `z`, `z_plus` | residual force before, after the hinge | 6 |
+//! | epsilon, nu | `epsilon`, `nu` | innovations, D^-1 epsilon | m, n |
+//! | f | `hinge_load` | hinge load | 6 |
+//!
+//! Departures from the printed equations: Eq. 32 keeps the whole `M_fl` of its first line; Eq. 12 reads `z+ = z + G epsilon`;
+//! prescribed accelerations enter once, through `a(k')`; gains belong to their own body (Eq. 13, 38). The interface shape is
+//! `Pi(eta) = [Jl(Phi_r eta) Phi_r; Phi_t]`, the rate of the finite rotation `exp(Phi_r eta)`, so that energy is conserved to the
+//! integrator's order. Gravity acts as the acceleration `-g` of the world, so `alpha` holds what an accelerometer would feel.
+
+pub mod dense;
+pub mod energy;
+pub mod flexible_inertia;
+pub mod frame_motion;
+pub mod hinge_load;
+pub mod inverse;
+pub mod modal_block;
+pub mod sweep;
+pub mod world;
+
+use crate::model::{State, System};
+use sweep::acceleration_outward::AccelerationScratch;
+use sweep::force_inward::ForceScratch;
+use sweep::inertia_inward::InertiaScratch;
+use sweep::pose_outward::PoseScratch;
+use sweep::velocity_outward::VelocityScratch;
+use thiserror::Error;
+
+/// Why an evaluation has no answer.
+#[derive(Debug, Error, Clone, PartialEq)]
+pub enum DynamicsError {
+    /// A hinge direction that moves no mass.
+    #[error(
+        "hinge \"{hinge}\" between \"{parent}\" and \"{child}\": the outboard inertia along its rate {rate} is {inertia:e}, which is zero beside {scale:e}; \
+         give \"{child}\" mass or inertia there, or fix or prescribe the hinge"
+    )]
+    SingularHinge {
+        /// Name of the hinge.
+        hinge: String,
+        /// Name of the parent body, or "world".
+        parent: String,
+        /// Name of the child body.
+        child: String,
+        /// 1-based number of the rate.
+        rate: usize,
+        /// Pivot of `D` found.
+        inertia: f64,
+        /// What it was compared with.
+        scale: f64,
+    },
+    /// Modes that carry more mass than the body has, seen from its inboard hinge.
+    #[error("body \"{body}\": its modes, held at the inboard hinge, have no positive definite mass; check the modal file with `pliant check`")]
+    SingularModes {
+        /// Name of the body.
+        body: String,
+    },
+}
+
+/// Everything an evaluation writes, allocated once per system.
+#[derive(Debug, Clone)]
+pub struct Workspace {
+    /// Poses and maps.
+    pub pose: PoseScratch,
+    /// Velocities and biases.
+    pub velocity: VelocityScratch,
+    /// Articulated inertias and gains.
+    pub inertia: InertiaScratch,
+    /// Residual forces.
+    pub force: ForceScratch,
+    /// Accelerations.
+    pub acceleration: AccelerationScratch,
+}
+
+impl Workspace {
+    /// Room for evaluations of `system`.
+    #[must_use]
+    pub fn new(system: &System) -> Self {
+        Self {
+            pose: PoseScratch::new(system),
+            velocity: VelocityScratch::new(system),
+            inertia: InertiaScratch::new(system),
+            force: ForceScratch::new(system),
+            acceleration: AccelerationScratch::new(system),
+        }
+    }
+}
+
+/// Accelerations of all hinge and modal coordinates at `state`, left in `workspace.acceleration`.
+///
+/// Prescribed hinges must already stand at their functions' values ([`State::apply_prescribed`]). Nothing is allocated.
+///
+/// # Errors
+/// [`DynamicsError`] if a hinge or a modal block is singular.
+pub fn forward_dynamics(system: &System, state: &State, workspace: &mut Workspace) -> Result<(), DynamicsError> {
+    let Workspace { pose, velocity, inertia, force, acceleration } = workspace;
+    sweep::pose_outward::pose_outward(system, state, pose);
+    sweep::velocity_outward::velocity_outward(system, state, pose, velocity);
+    sweep::inertia_inward::inertia_inward(system, pose, inertia)?;
+    sweep::force_inward::force_inward(system, state, pose, velocity, inertia, force);
+    sweep::acceleration_outward::acceleration_outward(system, pose, velocity, inertia, force, acceleration);
+    Ok(())
+}

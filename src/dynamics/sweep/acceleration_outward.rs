@@ -1,0 +1,88 @@
+//! Acceleration sweep: hinge and modal accelerations, from the base to the tips.
+//!
+//! Reads: the earlier sweeps. Writes: [`AccelerationScratch`]. Source: Paper Eq. 36 to 41 (the last line of Eq. 41 ends in `z+(k')`).
+//! Cost: O(bodies + modes).
+
+use super::force_inward::{ForceScratch, world_acceleration};
+use super::inertia_inward::InertiaScratch;
+use super::pose_outward::PoseScratch;
+use super::velocity_outward::VelocityScratch;
+use crate::model::System;
+use crate::spatial::shift::{motion_to, rotate, rotate_back};
+use nalgebra::Vector6;
+
+/// What the acceleration sweep writes.
+#[derive(Debug, Clone)]
+pub struct AccelerationScratch {
+    /// `alpha+(k')` at O in O axes, one per body.
+    pub alpha_plus: Vec<Vector6<f64>>,
+    /// `alpha(k)` of the recursion's frame in its axes, one per body; its linear part is acceleration less gravity.
+    pub alpha: Vec<Vector6<f64>>,
+    /// Accelerations of the hinge rates.
+    pub hinge: Vec<f64>,
+    /// Accelerations of the modal coordinates.
+    pub modal: Vec<f64>,
+}
+
+impl AccelerationScratch {
+    /// Room for `system`.
+    #[must_use]
+    pub fn new(system: &System) -> Self {
+        Self {
+            alpha_plus: vec![Vector6::zeros(); system.bodies.len()],
+            alpha: vec![Vector6::zeros(); system.bodies.len()],
+            hinge: vec![0.0; system.velocity_count],
+            modal: vec![0.0; system.modal_count],
+        }
+    }
+}
+
+/// Fills `out` from the earlier sweeps.
+pub fn acceleration_outward(
+    system: &System,
+    pose: &PoseScratch,
+    velocity: &VelocityScratch,
+    inertia: &InertiaScratch,
+    force: &ForceScratch,
+    out: &mut AccelerationScratch,
+) {
+    let world = world_acceleration(system);
+    for (k, body) in system.bodies.iter().enumerate() {
+        let own = &pose.bodies[k];
+        let mut alpha_outer = motion_to(&own.l, &body.parent.map_or(world, |p| out.alpha[p]));
+        if let Some(parent) = body.parent {
+            let eta_ddot = &out.modal[system.bodies[parent].modal_range()];
+            for (s, e) in pose.shape_of(system, k).iter().zip(eta_ddot) {
+                alpha_outer += s * *e;
+            }
+        }
+        let alpha_plus = rotate_back(&own.rotation, &alpha_outer);
+        out.alpha_plus[k] = alpha_plus;
+
+        let mut alpha = alpha_plus + velocity.bodies[k].a;
+        if body.hinge.is_prescribed() {
+            let range = body.velocity_range();
+            out.hinge[range.clone()].copy_from_slice(&velocity.prescribed[range]);
+        } else {
+            for i in 0..body.hinge.kind.rate_count() {
+                let acceleration = force.bodies[k].nu[i] - inertia.bodies[k].G[i].dot(&alpha_plus);
+                out.hinge[body.velocity + i] = acceleration;
+                alpha += own.hinge.map[i] * acceleration;
+            }
+        }
+        if let Some(index) = own.flexible {
+            let part = &pose.flexible[index];
+            let alpha_b = motion_to(&-part.inboard.position, &rotate(&part.inboard.rotation, &alpha));
+            let range = body.modal_range();
+            alpha = alpha_b + velocity.bodies[k].a_inboard;
+            for (j, m) in range.enumerate() {
+                let acceleration = force.nu_modal[m] - inertia.flexible[index].gain_modal[j].dot(&alpha_b);
+                out.modal[m] = acceleration;
+                if let Some(s) = part.shape_inboard.get(j) {
+                    alpha -= s * acceleration;
+                }
+            }
+        }
+        out.alpha[k] = alpha;
+    }
+}

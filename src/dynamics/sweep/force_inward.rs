@@ -1,0 +1,220 @@
+//! Force sweep: residual forces `z`, innovations and `nu`, from the tips to the base.
+//!
+//! Reads: state, [`PoseScratch`], [`VelocityScratch`], [`InertiaScratch`]. Writes: [`ForceScratch`].
+//! Source: Paper Eq. 34 and 35. Cost: O(bodies + modes + loads).
+
+use super::inertia_inward::{InertiaScratch, solve_hinge};
+use super::pose_outward::PoseScratch;
+use super::velocity_outward::VelocityScratch;
+use crate::dynamics::frame_motion::FramePose;
+use crate::dynamics::world::{WorldFrame, world_frames};
+use crate::model::hinge::MAX_RATES;
+use crate::model::{Body, HingeKind, Load, LoadAxes, LoadPoint, State, System};
+use crate::spatial::shift::{force_from, motion_to, rotate, rotate_back, spatial};
+use nalgebra::{Vector3, Vector6};
+
+/// Residual forces at one hinge.
+#[derive(Debug, Clone, Copy)]
+pub struct BodyForce {
+    /// Rigid rows of `z` in the recursion's frame.
+    pub z: Vector6<f64>,
+    /// `z+(k')` at O in O axes.
+    pub z_plus: Vector6<f64>,
+    /// `D^-1 epsilon` of the hinge.
+    pub nu: [f64; MAX_RATES],
+}
+
+/// What the force sweep writes.
+#[derive(Debug, Clone)]
+pub struct ForceScratch {
+    /// One per body.
+    pub bodies: Vec<BodyForce>,
+    /// External force on the rigid rows of each body, in the recursion's frame; empty without loads.
+    pub external: Vec<Vector6<f64>>,
+    /// External force on the modes, indexed like the modal coordinates; empty without loads.
+    pub external_modal: Vec<f64>,
+    /// `nu` of the modes, indexed like the modal coordinates.
+    pub nu_modal: Vec<f64>,
+    /// Hinge forces of springs, dampers and motors, indexed like the hinge rates.
+    pub applied: Vec<f64>,
+    /// World frames of the bodies; empty unless a load is given in inertial axes.
+    world: Vec<WorldFrame>,
+    shape: Vec<Vector6<f64>>,
+}
+
+impl ForceScratch {
+    /// Room for `system`.
+    #[must_use]
+    pub fn new(system: &System) -> Self {
+        let loaded = !system.loads.is_empty();
+        Self {
+            bodies: vec![BodyForce { z: Vector6::zeros(), z_plus: Vector6::zeros(), nu: [0.0; MAX_RATES] }; system.bodies.len()],
+            external: vec![Vector6::zeros(); if loaded { system.bodies.len() } else { 0 }],
+            external_modal: vec![0.0; if loaded { system.modal_count } else { 0 }],
+            nu_modal: vec![0.0; system.modal_count],
+            applied: vec![0.0; system.velocity_count],
+            world: vec![WorldFrame::default(); if system.has_world_loads() { system.bodies.len() } else { 0 }],
+            shape: vec![Vector6::zeros(); if loaded { system.largest_mode_count() } else { 0 }],
+        }
+    }
+}
+
+/// Fills `out` from the state and the earlier sweeps.
+pub fn force_inward(
+    system: &System,
+    state: &State,
+    pose: &PoseScratch,
+    velocity: &VelocityScratch,
+    inertia: &InertiaScratch,
+    out: &mut ForceScratch,
+) {
+    gather_applied(system, state, pose, out);
+    for k in 0..system.bodies.len() {
+        let external = out.external.get(k).copied().unwrap_or_default();
+        out.bodies[k].z = velocity.bodies[k].b - external;
+    }
+    for (k, body) in system.bodies.iter().enumerate().rev() {
+        let own = &velocity.bodies[k];
+        let z_hinge = match pose.bodies[k].flexible {
+            None => out.bodies[k].z,
+            Some(index) => {
+                let z = filter_modes(system, state, pose, velocity, inertia, k, index, out);
+                let inboard = &pose.flexible[index].inboard;
+                rotate_back(&inboard.rotation, &force_from(&-inboard.position, &z))
+            }
+        };
+        let z_hinge = z_hinge + inertia.bodies[k].P_hinge.times(&own.a);
+        filter_hinge(body, &pose.bodies[k].hinge.map, &inertia.bodies[k], z_hinge, out, k);
+        if let Some(parent) = body.parent {
+            let felt = force_from(&pose.bodies[k].l, &rotate(&pose.bodies[k].rotation, &out.bodies[k].z_plus));
+            out.bodies[parent].z += felt;
+        }
+    }
+}
+
+/// Forces of loads, springs, dampers and motors at `state`: the part of the sweep that needs no inertias.
+pub fn gather_applied(system: &System, state: &State, pose: &PoseScratch, out: &mut ForceScratch) {
+    if !system.loads.is_empty() {
+        apply_loads(system, state, pose, out);
+    }
+    for body in &system.bodies {
+        let applied = &mut out.applied[body.velocity_range()];
+        body.hinge.applied_force(state.time, &state.position[body.position_range()], &state.velocity[body.velocity_range()], applied);
+    }
+}
+
+/// Modes of flexible body `k` (Eq. 34); returns `z_cr+` at B.
+#[expect(clippy::too_many_arguments, reason = "a sweep step reads every earlier sweep")]
+fn filter_modes(
+    system: &System,
+    state: &State,
+    pose: &PoseScratch,
+    velocity: &VelocityScratch,
+    inertia: &InertiaScratch,
+    k: usize,
+    index: usize,
+    out: &mut ForceScratch,
+) -> Vector6<f64> {
+    let body = &system.bodies[k];
+    let (range, part, elimination) = (body.modal_range(), &pose.flexible[index], &inertia.flexible[index]);
+    let a = velocity.bodies[k].a_inboard;
+    let epsilon = &mut out.nu_modal[range.clone()];
+
+    // epsilon = -z_m + Pi_B' z_cr, gathered in place
+    if let Some(flexible) = body.flexible() {
+        flexible.elastic_force(&state.modal_position[range.clone()], &state.modal_velocity[range.clone()], epsilon);
+    }
+    let b_modal = &velocity.b_modal[range.clone()];
+    for (j, e) in epsilon.iter_mut().enumerate() {
+        *e = -(*e + b_modal[j] + part.inertia.row[j].dot(&a));
+    }
+    if let Some(external) = out.external_modal.get(range) {
+        epsilon.iter_mut().zip(external).for_each(|(e, x)| *e += x);
+    }
+    for &child in &elimination.moved_children {
+        let child_pose = &pose.bodies[child];
+        let Some(start) = child_pose.shape else { continue };
+        let felt = rotate(&child_pose.rotation, &out.bodies[child].z_plus) + inertia.bodies[child].S.times(&motion_to(&child_pose.l, &a));
+        epsilon.iter_mut().zip(&pose.shape[start..]).for_each(|(e, s)| *e -= s.dot(&felt));
+    }
+    // P_rr already holds the children, z their forces
+    let z = out.bodies[k].z + inertia.bodies[k].P.times(&a);
+    epsilon.iter_mut().zip(&part.shape_inboard).for_each(|(e, s)| *e += s.dot(&z));
+    elimination.modal_block.solve(epsilon);
+    z + elimination.mu.iter().zip(epsilon.iter()).map(|(mu, nu)| mu * *nu).sum::<Vector6<f64>>()
+}
+
+/// Hinge of body `k` (Eq. 35).
+fn filter_hinge(
+    body: &Body,
+    map: &[Vector6<f64>; MAX_RATES],
+    inertia: &super::inertia_inward::BodyInertia,
+    z: Vector6<f64>,
+    out: &mut ForceScratch,
+    k: usize,
+) {
+    let own = &mut out.bodies[k];
+    own.z_plus = z;
+    let m = body.hinge.kind.rate_count();
+    if m == 0 || body.hinge.is_prescribed() {
+        return;
+    }
+    let applied = &out.applied[body.velocity_range()];
+    for i in 0..m {
+        let epsilon = applied[i] - map[i].dot(&z);
+        own.nu[i] = epsilon;
+        own.z_plus += inertia.G[i] * epsilon;
+    }
+    solve_hinge(&inertia.D, &mut own.nu[..m]);
+    if matches!(body.hinge.kind, HingeKind::Free) {
+        // the hinge transmits what acts on its rates and nothing else
+        own.z_plus = Vector6::from_iterator(applied.iter().copied());
+    }
+}
+
+/// External loads on the rows of their bodies.
+fn apply_loads(system: &System, state: &State, pose: &PoseScratch, out: &mut ForceScratch) {
+    if !out.world.is_empty() {
+        world_frames(system, pose, &mut out.world);
+    }
+    out.external.fill(Vector6::zeros());
+    out.external_modal.fill(0.0);
+    for load in &system.loads {
+        let body = &system.bodies[load.body];
+        let value = match load.axes {
+            LoadAxes::World => rotate_back(&out.world[load.body].rotation, &load.value(state.time)),
+            LoadAxes::Body => rotate(&body.frame_rotation, &load.value(state.time)),
+        };
+        let eta = &state.modal_position[body.modal_range()];
+        let shape = &mut out.shape[..eta.len()];
+        let point = load_shape(load, eta, shape);
+        out.external[load.body] += force_from(&point, &value);
+        for (x, s) in out.external_modal[body.modal_range()].iter_mut().zip(shape.iter()) {
+            *x += s.dot(&value);
+        }
+    }
+}
+
+/// Present point of a load (m) in the recursion's frame of its body, and the mode shape there.
+fn load_shape(load: &Load, eta: &[f64], shape: &mut [Vector6<f64>]) -> Vector3<f64> {
+    match &load.point {
+        LoadPoint::Rigid(point) => *point,
+        LoadPoint::Interface(attachment) => {
+            let frame = FramePose::of(attachment, eta);
+            shape.fill(Vector6::zeros());
+            frame.shape_at(attachment, &frame.position, shape);
+            frame.position
+        }
+        LoadPoint::Node { position, mode_shape } => {
+            shape.copy_from_slice(mode_shape);
+            let displacement: Vector6<f64> = mode_shape.iter().zip(eta).map(|(s, e)| s * *e).sum();
+            position + displacement.fixed_rows::<3>(3)
+        }
+    }
+}
+
+/// Force of gravity is not here: it enters as the acceleration of the world. This is that acceleration.
+#[must_use]
+pub fn world_acceleration(system: &System) -> Vector6<f64> {
+    spatial(&Vector3::zeros(), &-system.gravity)
+}

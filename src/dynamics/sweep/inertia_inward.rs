@@ -1,0 +1,247 @@
+//! Inertia sweep: articulated inertias `P`, `P+` and gains, from the tips to the base.
+//!
+//! Reads: [`PoseScratch`]. Writes: [`InertiaScratch`]. Source: Paper Eq. 32 (with the whole `M_fl`) and 33.
+//! Cost: O(bodies + modes), plus O(children^2 modes) per flexible body.
+#![expect(non_snake_case, reason = "symbols follow the table in dynamics/mod.rs")]
+
+use super::pose_outward::PoseScratch;
+use crate::dynamics::DynamicsError;
+use crate::dynamics::modal_block::{ModalBlock, SingularBlock};
+use crate::model::hinge::MAX_RATES;
+use crate::model::{Body, BodyKind, HingeKind, System};
+use crate::spatial::SpatialInertia;
+use crate::spatial::shift::motion_to;
+use nalgebra::Vector6;
+
+/// What the sweep leaves of one hinge.
+#[derive(Debug, Clone, Copy)]
+pub struct BodyInertia {
+    /// Articulated inertia of the recursion's frame (O, or B of a flexible body): `P_rr`.
+    pub P: SpatialInertia,
+    /// `P(k')` at O in O axes; equal to `P` for a rigid body.
+    pub P_hinge: SpatialInertia,
+    /// `P+(k')` at O in O axes.
+    pub P_plus: SpatialInertia,
+    /// `P+(k')` at O in the axes of the parent's frame.
+    pub S: SpatialInertia,
+    /// `P H* D^-1`, one column per rate.
+    pub G: [Vector6<f64>; MAX_RATES],
+    /// `L D L'` of the hinge inertia D: unit lower triangle row by row, pivots on the diagonal.
+    pub D: [[f64; MAX_RATES]; MAX_RATES],
+}
+
+/// What the sweep leaves of one flexible body.
+#[derive(Debug, Clone)]
+pub struct FlexibleElimination {
+    /// Factored `D_fl`.
+    pub modal_block: ModalBlock,
+    /// `mu'`, one row per mode, at B.
+    pub mu: Vec<Vector6<f64>>,
+    /// `E = D_fl^-1 mu'`, one row per mode.
+    pub gain_modal: Vec<Vector6<f64>>,
+    /// Children whose O moves with respect to this body's O as modes change.
+    pub moved_children: Vec<usize>,
+}
+
+/// What the inertia sweep writes.
+#[derive(Debug, Clone)]
+pub struct InertiaScratch {
+    /// One per body.
+    pub bodies: Vec<BodyInertia>,
+    /// One per flexible body, in the order of [`PoseScratch::flexible`].
+    pub flexible: Vec<FlexibleElimination>,
+}
+
+impl InertiaScratch {
+    /// Room for `system`.
+    #[must_use]
+    pub fn new(system: &System) -> Self {
+        let zero = SpatialInertia::default();
+        let empty = BodyInertia {
+            P: zero,
+            P_hinge: zero,
+            P_plus: zero,
+            S: zero,
+            G: [Vector6::zeros(); MAX_RATES],
+            D: [[0.0; MAX_RATES]; MAX_RATES],
+        };
+        let mut children = vec![Vec::new(); system.bodies.len()];
+        for (k, body) in system.bodies.iter().enumerate() {
+            if let Some(parent) = body.parent {
+                let root_moves = system.bodies[parent].flexible().is_some_and(|f| f.inboard.moves());
+                if body.parent_side.moves() || root_moves {
+                    children[parent].push(k);
+                }
+            }
+        }
+        let eliminate = |(k, body): (usize, &Body)| {
+            body.flexible().map(|flexible| {
+                let n = flexible.mode_count();
+                FlexibleElimination {
+                    modal_block: ModalBlock::new(n, children[k].len(), flexible.inboard.moves()),
+                    mu: vec![Vector6::zeros(); n],
+                    gain_modal: vec![Vector6::zeros(); n],
+                    moved_children: children[k].clone(),
+                }
+            })
+        };
+        Self {
+            bodies: vec![empty; system.bodies.len()],
+            flexible: system.bodies.iter().enumerate().filter_map(eliminate).collect(),
+        }
+    }
+}
+
+/// Fills `out` from the poses.
+///
+/// # Errors
+/// [`DynamicsError`] naming the hinge or body whose inertia is singular.
+pub fn inertia_inward(system: &System, pose: &PoseScratch, out: &mut InertiaScratch) -> Result<(), DynamicsError> {
+    for (k, body) in system.bodies.iter().enumerate() {
+        out.bodies[k].P = match (&body.kind, pose.bodies[k].flexible) {
+            (BodyKind::Rigid(inertia), _) => *inertia,
+            (BodyKind::Flexible(_), index) => index.map_or(SpatialInertia::default(), |i| pose.flexible[i].inertia.rigid),
+        };
+    }
+    for (k, body) in system.bodies.iter().enumerate().rev() {
+        if let Some(index) = pose.bodies[k].flexible {
+            eliminate_modes(pose, k, index, out).map_err(|SingularBlock| DynamicsError::SingularModes { body: body.name.clone() })?;
+        } else {
+            out.bodies[k].P_hinge = out.bodies[k].P;
+        }
+        let own = &mut out.bodies[k];
+        eliminate_hinge(body, &pose.bodies[k].hinge.map, own).map_err(|(rate, inertia, scale)| DynamicsError::SingularHinge {
+            hinge: body.hinge.name.clone(),
+            parent: body.parent.map_or_else(|| "world".to_owned(), |p| system.bodies[p].name.clone()),
+            child: body.name.clone(),
+            rate: rate + 1,
+            inertia,
+            scale,
+        })?;
+        if let Some(parent) = body.parent {
+            own.S = own.P_plus.rotated(&pose.bodies[k].rotation);
+            let felt = own.S.moved_by(&pose.bodies[k].l);
+            out.bodies[parent].P = out.bodies[parent].P.plus(&felt);
+        }
+    }
+    Ok(())
+}
+
+/// Modes of flexible body `k`: `P_cr+ = P_rr - mu D_fl^-1 mu'` (Eq. 32), moved to O.
+fn eliminate_modes(pose: &PoseScratch, k: usize, index: usize, out: &mut InertiaScratch) -> Result<(), SingularBlock> {
+    let part = &pose.flexible[index];
+    let FlexibleElimination { modal_block, mu, gain_modal, moved_children } = &mut out.flexible[index];
+    let (inertia, shape_inboard) = (&part.inertia, &part.shape_inboard);
+
+    // mu of the body alone: M_fr - Pi_B' M_rr
+    modal_block.begin(&inertia.row, &inertia.rigid, shape_inboard)?;
+    mu.copy_from_slice(&inertia.row);
+    for (mu, s) in mu.iter_mut().zip(shape_inboard) {
+        *mu -= inertia.rigid.times(s);
+    }
+    for &child in moved_children.iter() {
+        let child_pose = &pose.bodies[child];
+        let S = out.bodies[child].S;
+        let shape = match child_pose.shape {
+            Some(start) => &pose.shape[start..start + mu.len()],
+            None => &[],
+        };
+        let fill = |Y: &mut [Vector6<f64>]| {
+            Y.fill(Vector6::zeros());
+            Y.iter_mut().zip(shape).for_each(|(y, s)| *y = *s);
+            Y.iter_mut().zip(shape_inboard).for_each(|(y, s)| *y -= motion_to(&child_pose.l, s));
+            for (mu, y) in mu.iter_mut().zip(Y.iter()) {
+                *mu += crate::spatial::shift::force_from(&child_pose.l, &S.times(y));
+            }
+        };
+        modal_block.add_child(fill, &S)?;
+    }
+    gain_modal.copy_from_slice(mu);
+    modal_block.solve_rows(gain_modal);
+
+    let mut taken = nalgebra::Matrix6::zeros();
+    for (mu, e) in mu.iter().zip(gain_modal.iter()) {
+        taken.ger(1.0, mu, e, 1.0);
+    }
+    let own = &mut out.bodies[k];
+    let left = SpatialInertia::from_matrix(&(own.P.matrix() - taken));
+    // from B to O at x: the origin of B lies at -x from O
+    own.P_hinge = left.moved_by(&-part.inboard.position).rotated(&part.inboard.rotation.transpose());
+    Ok(())
+}
+
+/// Pivots at or below this multiple of what they were formed from are rounding, not inertia.
+const SINGULAR: f64 = 8.0 * f64::EPSILON;
+
+/// Hinge of a body: `D = H P H*`, `G = P H* D^-1`, `P+ = P - G D G*` (Eq. 33). Errors: (rate, pivot, scale).
+fn eliminate_hinge(body: &Body, map: &[Vector6<f64>; MAX_RATES], own: &mut BodyInertia) -> Result<(), (usize, f64, f64)> {
+    own.P_plus = own.P_hinge;
+    let m = body.hinge.kind.rate_count();
+    if m == 0 || body.hinge.is_prescribed() {
+        return Ok(());
+    }
+    let P = &own.P_hinge;
+    let mut U = [Vector6::zeros(); MAX_RATES];
+    for i in 0..m {
+        U[i] = P.times(&map[i]);
+    }
+    // size of what a pivot is the sum of: rounding of D grows with it
+    let (turn, travel) = (P.rotational.trace(), P.translational.trace());
+    let D = &mut own.D;
+    for i in 0..m {
+        let scale = turn * map[i].fixed_rows::<3>(0).norm_squared() + travel * map[i].fixed_rows::<3>(3).norm_squared();
+        for j in 0..=i {
+            let mut sum = map[i].dot(&U[j]);
+            for c in 0..j {
+                sum -= D[i][c] * D[c][c] * D[j][c];
+            }
+            D[i][j] = if i == j { sum } else { sum / D[j][j] };
+        }
+        if !(D[i][i] > SINGULAR * scale) {
+            return Err((i, D[i][i], scale));
+        }
+    }
+    if matches!(body.hinge.kind, HingeKind::Free) {
+        // nothing passes a free hinge: exactly zero instead of rounding
+        own.P_plus = SpatialInertia::default();
+    } else {
+        // columns of U L^-T: P+ = P - sum w w' / d, symmetric as formed
+        let mut w = U;
+        for i in 0..m {
+            for c in 0..i {
+                let (done, rest) = w.split_at_mut(i);
+                rest[0] -= done[c] * D[i][c];
+            }
+            own.P_plus.subtract_outer(&w[i], D[i][i]);
+        }
+    }
+    for row in 0..6 {
+        let mut x = [0.0; MAX_RATES];
+        for i in 0..m {
+            x[i] = U[i][row];
+        }
+        solve_hinge(D, &mut x[..m]);
+        for i in 0..m {
+            own.G[i][row] = x[i];
+        }
+    }
+    Ok(())
+}
+
+/// `x <- D^-1 x` with the factors of D.
+pub fn solve_hinge(D: &[[f64; MAX_RATES]; MAX_RATES], x: &mut [f64]) {
+    let m = x.len();
+    for i in 0..m {
+        for c in 0..i {
+            x[i] -= D[i][c] * x[c];
+        }
+    }
+    for i in 0..m {
+        x[i] /= D[i][i];
+    }
+    for i in (0..m).rev() {
+        for c in i + 1..m {
+            x[i] -= D[c][i] * x[c];
+        }
+    }
+}
