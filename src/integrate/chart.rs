@@ -1,0 +1,127 @@
+//! The initial value problem of one step, in coordinates local to the step's start.
+//!
+//! y = (increments of hinge and modal coordinates; hinge and modal rates; work of what is not conservative). Increments of
+//! rotations are rotation vectors with rate `Jr^-1 omega`, so y starts at zero increments in every step (a Munthe-Kaas method).
+
+use crate::dynamics::{DynamicsError, Workspace, energy, forward_dynamics};
+use crate::model::{State, System};
+
+/// Local problem: a base state and the map from y to states and rates.
+#[derive(Debug)]
+pub struct Chart<'a> {
+    /// The system.
+    pub system: &'a System,
+    /// State at the step's start.
+    pub base: State,
+    /// Work done up to the step's start (J).
+    pub work: f64,
+    /// Evaluations so far.
+    pub evaluations: u64,
+    /// The last evaluation.
+    pub workspace: Workspace,
+    state: State,
+}
+
+impl<'a> Chart<'a> {
+    /// A chart at `start`.
+    #[must_use]
+    pub fn new(system: &'a System, start: &State) -> Self {
+        Self { system, base: start.clone(), work: 0.0, evaluations: 0, workspace: Workspace::new(system), state: start.clone() }
+    }
+
+    /// Number of increments: hinge rates and modes.
+    #[must_use]
+    pub fn increments(&self) -> usize {
+        self.system.velocity_count + self.system.modal_count
+    }
+
+    /// Length of y.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        2 * self.increments() + 1
+    }
+
+    /// True for a system without coordinates.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.increments() == 0
+    }
+
+    /// y of the base.
+    pub fn base_vector(&self, y: &mut [f64]) {
+        let (n, nv) = (self.increments(), self.system.velocity_count);
+        y[..n].fill(0.0);
+        y[n..n + nv].copy_from_slice(&self.base.velocity);
+        y[n + nv..2 * n].copy_from_slice(&self.base.modal_velocity);
+        y[2 * n] = self.work;
+    }
+
+    /// State that y stands for at `time` (s), prescribed hinges at their functions' values.
+    pub fn state_of(&self, time: f64, y: &[f64], out: &mut State) {
+        let (n, nv) = (self.increments(), self.system.velocity_count);
+        out.time = time;
+        for body in &self.system.bodies {
+            let (q, v) = (body.position_range(), body.velocity_range());
+            body.hinge.kind.advance(&self.base.position[q.clone()], &y[v], &mut out.position[q]);
+        }
+        for (o, (b, d)) in out.modal_position.iter_mut().zip(self.base.modal_position.iter().zip(&y[nv..n])) {
+            *o = b + d;
+        }
+        out.velocity.copy_from_slice(&y[n..n + nv]);
+        out.modal_velocity.copy_from_slice(&y[n + nv..2 * n]);
+        out.apply_prescribed(self.system);
+    }
+
+    /// Evaluates the rate of y at `time` (s).
+    ///
+    /// # Errors
+    /// If the dynamics have no answer there.
+    pub fn rate(&mut self, time: f64, y: &[f64], rate: &mut [f64]) -> Result<(), DynamicsError> {
+        let mut state = std::mem::replace(&mut self.state, State { time, position: vec![], velocity: vec![], modal_position: vec![], modal_velocity: vec![] });
+        self.state_of(time, y, &mut state);
+        let done = self.rate_at(&state, y, rate);
+        self.state = state;
+        done
+    }
+
+    fn rate_at(&mut self, state: &State, y: &[f64], rate: &mut [f64]) -> Result<(), DynamicsError> {
+        self.evaluations += 1;
+        forward_dynamics(self.system, state, &mut self.workspace)?;
+        let (n, nv) = (self.increments(), self.system.velocity_count);
+        for body in &self.system.bodies {
+            let v = body.velocity_range();
+            if body.hinge.is_prescribed() {
+                rate[v].fill(0.0);
+            } else {
+                let q = &state.position[body.position_range()];
+                body.hinge.kind.increment_rate(q, &y[v.clone()], &state.velocity[v.clone()], &mut rate[v]);
+            }
+        }
+        rate[nv..n].copy_from_slice(&state.modal_velocity);
+        rate[n..n + nv].copy_from_slice(&self.workspace.acceleration.hinge);
+        rate[n + nv..2 * n].copy_from_slice(&self.workspace.acceleration.modal);
+        for &k in &self.system.prescribed {
+            let v = self.system.bodies[k].velocity_range();
+            rate[n + v.start..n + v.end].fill(0.0);
+        }
+        rate[2 * n] = energy::power(self.system, state, &self.workspace);
+        Ok(())
+    }
+
+    /// Moves the base to the state that y stands for at `time`, and the rate of y to the new chart's.
+    pub fn rebase(&mut self, time: f64, y: &[f64], rate: &mut [f64]) {
+        let mut state = std::mem::replace(&mut self.state, State { time, position: vec![], velocity: vec![], modal_position: vec![], modal_velocity: vec![] });
+        self.state_of(time, y, &mut state);
+        std::mem::swap(&mut self.base, &mut state);
+        self.state = state;
+        self.work = y[2 * self.increments()];
+        let zero = [0.0; crate::model::hinge::MAX_RATES];
+        for body in &self.system.bodies {
+            let v = body.velocity_range();
+            if !body.hinge.is_prescribed() {
+                let q = &self.base.position[body.position_range()];
+                body.hinge.kind.increment_rate(q, &zero[..v.len()], &self.base.velocity[v.clone()], &mut rate[v]);
+            }
+        }
+    }
+}

@@ -1,0 +1,51 @@
+//! Time: explicit Runge-Kutta methods on the manifold of hinge rotations, step control, and the loop that drives them.
+//!
+//! Every method integrates the same local problem ([`chart::Chart`]): within a step, hinge rotations are rotation vectors from the
+//! step's start, so that quaternions stay of unit length and each method keeps its order. A linearly implicit method
+//! belongs beside [`runge_kutta`], behind the same [`Stepper`] interface.
+
+pub mod chart;
+pub mod observer;
+pub mod runge_kutta;
+pub mod simulate;
+pub mod stability;
+pub mod step_control;
+pub mod tableau;
+
+pub use observer::{Flow, Observer, Sample};
+pub use runge_kutta::RungeKutta;
+pub use simulate::{Outcome, RunFailure, Settings, Summary, simulate};
+
+use crate::dynamics::DynamicsError;
+use crate::model::State;
+use chart::Chart;
+
+/// A one-step method with dense output.
+pub trait Stepper {
+    /// Name in reports.
+    fn name(&self) -> &'static str;
+
+    /// Takes the state to where a step may begin: evaluates there and drops what an earlier step left.
+    ///
+    /// # Errors
+    /// If the evaluation has no answer.
+    fn restart(&mut self, chart: &mut Chart<'_>) -> Result<(), DynamicsError>;
+
+    /// Tries a step of `h` (s) from the chart's base; returns the error estimate relative to the tolerances, none for fixed steps.
+    ///
+    /// # Errors
+    /// If an evaluation within the step has no answer.
+    fn attempt(&mut self, chart: &mut Chart<'_>, h: f64) -> Result<Option<f64>, DynamicsError>;
+
+    /// State at the fraction `theta` of the attempted step.
+    fn interpolate(&self, chart: &Chart<'_>, theta: f64, out: &mut State);
+
+    /// Work (J) at the fraction `theta` of the attempted step.
+    fn interpolate_work(&self, theta: f64) -> f64;
+
+    /// Makes the end of the attempted step the chart's base.
+    fn accept(&mut self, chart: &mut Chart<'_>);
+
+    /// Order that step control may count on, none for fixed steps.
+    fn controlled_order(&self) -> Option<u8>;
+}

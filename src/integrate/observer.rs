@@ -1,0 +1,34 @@
+//! What the time loop knows of the outside: observers that see samples.
+
+use crate::dynamics::Workspace;
+use crate::model::{State, System};
+
+/// One output time: the state, and the evaluation there.
+#[derive(Debug)]
+pub struct Sample<'a> {
+    /// The system.
+    pub system: &'a System,
+    /// State at the output time.
+    pub state: &'a State,
+    /// Evaluation at that state: accelerations, and hinge loads through [`crate::dynamics::hinge_load`].
+    pub workspace: &'a Workspace,
+    /// Work (J) of drives, dampers and loads since the start.
+    pub work: f64,
+    /// Steps taken so far.
+    pub steps: u64,
+}
+
+/// What an observer asks of the loop.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Flow {
+    /// Go on.
+    Continue,
+    /// End the run here; what was computed is kept.
+    Stop,
+}
+
+/// Something that looks at every output time.
+pub trait Observer {
+    /// Called at every output time, in order.
+    fn observe(&mut self, sample: &Sample<'_>) -> Flow;
+}

@@ -1,0 +1,337 @@
+//! The time loop: steps, breaks, output times, and an orderly end whatever happens.
+
+use super::chart::Chart;
+use super::observer::{Flow, Observer, Sample};
+use super::runge_kutta::RungeKutta;
+use super::step_control::{Controller, Tolerance};
+use super::stability::{fastest_mode, stable_step};
+use super::tableau::Tableau;
+use super::{Stepper, tableau};
+use crate::dynamics::{DynamicsError, Workspace, forward_dynamics};
+use crate::model::{State, System};
+use thiserror::Error;
+
+/// A method with its step or tolerance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Method {
+    /// Fixed steps of the classical method of order 4 (s).
+    RungeKutta4 { step: f64 },
+    /// Dormand-Prince 5(4) with error control; `largest_step` in s.
+    DormandPrince { tolerance: Tolerance, largest_step: f64 },
+}
+
+impl Method {
+    /// Coefficients of the method.
+    #[must_use]
+    pub fn tableau(&self) -> Tableau {
+        match self {
+            Self::RungeKutta4 { .. } => tableau::RK4,
+            Self::DormandPrince { .. } => tableau::DORMAND_PRINCE,
+        }
+    }
+}
+
+/// What to run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// s.
+    pub duration: f64,
+    /// Method.
+    pub method: Method,
+    /// Output times per second.
+    pub rate_hz: f64,
+}
+
+/// Why a run ended before its duration.
+#[derive(Debug, Error, Clone, PartialEq)]
+pub enum RunFailure {
+    /// An evaluation without an answer.
+    #[error("at t = {time} s: {source}")]
+    Dynamics {
+        /// s.
+        time: f64,
+        /// What went wrong.
+        source: DynamicsError,
+    },
+    /// Numbers that left the finite range.
+    #[error("at t = {time} s the motion left finite numbers, fastest in {place}; {remedy}")]
+    NotFinite {
+        /// Time of the last finite state (s).
+        time: f64,
+        /// Mode or hinge that moved fastest.
+        place: String,
+        /// What to do.
+        remedy: &'static str,
+    },
+    /// A step that became too small to advance time.
+    #[error("at t = {time} s the step fell to {step:e} s, fastest motion in {place}; loosen relative_tolerance or look for a discontinuity there")]
+    StepUnderflow {
+        /// s.
+        time: f64,
+        /// s.
+        step: f64,
+        /// Mode or hinge that moved fastest.
+        place: String,
+    },
+}
+
+/// How a run ended.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Outcome {
+    /// At its duration.
+    Completed,
+    /// Where an observer asked to stop.
+    Stopped,
+    /// Early.
+    Failed(RunFailure),
+}
+
+/// What a run did.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Summary {
+    /// How it ended.
+    pub outcome: Outcome,
+    /// Time reached (s).
+    pub time: f64,
+    /// Accepted steps.
+    pub steps: u64,
+    /// Rejected steps.
+    pub rejected: u64,
+    /// Evaluations of the dynamics, output included.
+    pub evaluations: u64,
+    /// Largest accepted local error estimate relative to the motion; none for fixed steps.
+    pub local_error: Option<f64>,
+    /// Last state.
+    pub end: State,
+}
+
+/// Integrates from `start` and shows every output time to the observers; all that is computed reaches them even if the run ends early.
+pub fn simulate(system: &System, start: &State, settings: &Settings, observers: &mut [&mut dyn Observer]) -> Summary {
+    let mut chart = Chart::new(system, start);
+    let (tolerance, step, largest) = match settings.method {
+        Method::RungeKutta4 { step } => (None, step, step),
+        Method::DormandPrince { tolerance, largest_step } => (Some(tolerance), first_step(system, settings, largest_step), largest_step),
+    };
+    let mut stepper = RungeKutta::new(settings.method.tableau(), tolerance, &chart);
+    let mut run = Run {
+        chart: &mut chart,
+        controller: stepper.controlled_order().map(Controller::new),
+        step,
+        largest,
+        relative: tolerance.map_or(0.0, |t| t.relative),
+        output: Workspace::new(system),
+        sampled: start.clone(),
+        outputs: OutputTimes { start: start.time, end: start.time + settings.duration, rate_hz: settings.rate_hz, next: 0, done: false },
+        steps: 0,
+        rejected: 0,
+        evaluations: 0,
+        local_error: 0.0,
+    };
+    let outcome = run.go(&mut stepper, observers);
+    let Run { steps, rejected, evaluations, local_error, .. } = run;
+    Summary {
+        outcome,
+        time: chart.base.time,
+        steps,
+        rejected,
+        evaluations: evaluations + chart.evaluations,
+        local_error: tolerance.map(|_| local_error),
+        end: chart.base,
+    }
+}
+
+/// A cautious first step: the controller lets it grow fivefold a step.
+fn first_step(system: &System, settings: &Settings, largest: f64) -> f64 {
+    let stable = fastest_mode(system).map_or(f64::INFINITY, |m| stable_step(&settings.method.tableau(), m.frequency_hz, m.damping_ratio));
+    let cautious = (1e-3 * settings.duration).min(0.1 * stable).min(1e-2);
+    cautious.min(largest)
+}
+
+/// Output times: multiples of the interval, and the end.
+#[derive(Debug)]
+struct OutputTimes {
+    start: f64,
+    end: f64,
+    rate_hz: f64,
+    next: u64,
+    done: bool,
+}
+
+impl OutputTimes {
+    /// The next output time, if it is not after `time`.
+    fn due(&mut self, time: f64) -> Option<f64> {
+        if self.done {
+            return None;
+        }
+        let at = self.start + self.next as f64 / self.rate_hz;
+        // the end is an output time of its own; a multiple within rounding of it is the same
+        let at = if at >= self.end - 1e-9 / self.rate_hz { self.end } else { at };
+        if at > time {
+            return None;
+        }
+        self.done = at == self.end;
+        self.next += 1;
+        Some(at)
+    }
+}
+
+struct Run<'r, 's> {
+    chart: &'r mut Chart<'s>,
+    controller: Option<Controller>,
+    step: f64,
+    largest: f64,
+    relative: f64,
+    output: Workspace,
+    sampled: State,
+    outputs: OutputTimes,
+    steps: u64,
+    rejected: u64,
+    evaluations: u64,
+    local_error: f64,
+}
+
+impl Run<'_, '_> {
+    fn go(&mut self, stepper: &mut dyn Stepper, observers: &mut [&mut dyn Observer]) -> Outcome {
+        let (start, end) = (self.outputs.start, self.outputs.end);
+        let mut stops: Vec<f64> = self.chart.system.breaks().into_iter().filter(|&t| t > start && t < end).collect();
+        stops.push(end);
+        if let Err(source) = stepper.restart(self.chart) {
+            return Outcome::Failed(RunFailure::Dynamics { time: start, source });
+        }
+        match self.emit(stepper, 0.0, observers) {
+            Ok(Flow::Continue) => {}
+            Ok(Flow::Stop) => return Outcome::Stopped,
+            Err(failure) => return Outcome::Failed(failure),
+        }
+        for stop in stops {
+            while self.chart.base.time < stop {
+                let done = self.advance(stepper, stop).and_then(|taken| {
+                    self.steps += 1;
+                    let flow = self.emit(stepper, taken, observers);
+                    stepper.accept(self.chart);
+                    if self.chart.base.time + 4.0 * f64::EPSILON * stop.abs() >= stop {
+                        // rounding of t + h must not leave a step of a few ulps
+                        self.chart.base.time = stop;
+                    }
+                    flow
+                });
+                match done {
+                    Ok(Flow::Continue) => {}
+                    Ok(Flow::Stop) => return Outcome::Stopped,
+                    Err(failure) => return Outcome::Failed(failure),
+                }
+            }
+            // a function may have jumped here
+            if stop < end
+                && let Err(source) = stepper.restart(self.chart)
+            {
+                return Outcome::Failed(RunFailure::Dynamics { time: stop, source });
+            }
+        }
+        Outcome::Completed
+    }
+
+    /// Finds a step towards `stop` that meets the tolerance; returns its length.
+    fn advance(&mut self, stepper: &mut dyn Stepper, stop: f64) -> Result<f64, RunFailure> {
+        loop {
+            let time = self.chart.base.time;
+            let left = stop - time;
+            // what is left is taken at once, or halved rather than leave a sliver
+            let step = if left <= self.step * (1.0 + 1e-9) {
+                left
+            } else if left < 2.0 * self.step && self.controller.is_some() {
+                0.5 * left
+            } else {
+                self.step
+            };
+            let floor = 16.0 * f64::EPSILON * time.abs().max(stop.abs());
+            if step < floor && step < left {
+                let place = fastest_place(self.chart);
+                return Err(if self.sampled.is_finite() && self.sampled.time > time {
+                    RunFailure::StepUnderflow { time, step, place }
+                } else {
+                    RunFailure::NotFinite { time, place, remedy: "look at the loads and springs that act there" }
+                });
+            }
+            let attempted = stepper.attempt(self.chart, step);
+            let Some(controller) = &mut self.controller else {
+                attempted.map_err(|source| RunFailure::Dynamics { time, source })?;
+                stepper.interpolate(self.chart, 1.0, &mut self.sampled);
+                if !self.sampled.is_finite() {
+                    let place = fastest_place(self.chart);
+                    return Err(RunFailure::NotFinite { time, place, remedy: "take a smaller step, fewer modes or an error-controlled integrator" });
+                }
+                return Ok(step);
+            };
+            match attempted {
+                Ok(Some(error)) if error <= 1.0 => {
+                    self.local_error = self.local_error.max(error * self.relative);
+                    let proposed = step * controller.accepted(error);
+                    // a step cut short by a stop says nothing against the one that was planned
+                    self.step = if step < self.step { proposed.max(self.step) } else { proposed }.min(self.largest);
+                    return Ok(step);
+                }
+                Ok(error) => {
+                    self.rejected += 1;
+                    self.step = step * controller.rejected(error.unwrap_or(f64::NAN));
+                    stepper.interpolate(self.chart, 1.0, &mut self.sampled);
+                }
+                Err(source) => {
+                    self.rejected += 1;
+                    self.step = 0.1 * step;
+                    if self.step < floor {
+                        return Err(RunFailure::Dynamics { time, source });
+                    }
+                }
+            }
+        }
+    }
+
+    /// Shows the output times within the attempted step of length `taken` to the observers.
+    fn emit(&mut self, stepper: &dyn Stepper, taken: f64, observers: &mut [&mut dyn Observer]) -> Result<Flow, RunFailure> {
+        let begin = self.chart.base.time;
+        let mut flow = Flow::Continue;
+        while let Some(at) = self.outputs.due(begin + taken + 4.0 * f64::EPSILON * self.outputs.end.abs()) {
+            if observers.is_empty() {
+                continue;
+            }
+            let work = if taken > 0.0 {
+                let theta = ((at - begin) / taken).clamp(0.0, 1.0);
+                stepper.interpolate(self.chart, theta, &mut self.sampled);
+                stepper.interpolate_work(theta)
+            } else {
+                self.sampled.clone_from(&self.chart.base);
+                self.chart.work
+            };
+            self.sampled.time = at;
+            self.sampled.apply_prescribed(self.chart.system);
+            self.evaluations += 1;
+            forward_dynamics(self.chart.system, &self.sampled, &mut self.output).map_err(|source| RunFailure::Dynamics { time: at, source })?;
+            let sample = Sample { system: self.chart.system, state: &self.sampled, workspace: &self.output, work, steps: self.steps };
+            for observer in observers.iter_mut() {
+                if observer.observe(&sample) == Flow::Stop {
+                    flow = Flow::Stop;
+                }
+            }
+        }
+        Ok(flow)
+    }
+}
+
+/// The hinge or mode that moves fastest, for messages.
+fn fastest_place(chart: &Chart<'_>) -> String {
+    let state = &chart.base;
+    let fastest = |x: &[f64]| x.iter().enumerate().fold((0, -1.0), |best, (i, x)| if x.abs() > best.1 { (i, x.abs()) } else { best });
+    let mut places = Vec::new();
+    for body in &chart.system.bodies {
+        let (rate, speed) = fastest(&state.velocity[body.velocity_range()]);
+        places.push((speed, format!("rate {} of hinge \"{}\"", rate + 1, body.hinge.name)));
+        if let Some(flexible) = body.flexible() {
+            let (mode, speed) = fastest(&state.modal_velocity[body.modal_range()]);
+            if let Some(number) = flexible.mode_numbers.get(mode) {
+                places.push((speed, format!("mode {number} of body \"{}\"", body.name)));
+            }
+        }
+    }
+    places.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)).map_or_else(|| "no coordinate".into(), |p| p.1)
+}
