@@ -17,9 +17,10 @@ FORMAT, VERSION = "flexible-body-modes", "1.0"
 UNITS = "m kg s rad Pa Hz"
 COMPRESS_ABOVE = 4096                                # bytes; smaller arrays stay contiguous
 _CHUNK = 1 << 18                                     # bytes
-# Stress is kept to this fraction of each mode's largest entry. The discretisation is thousands of times coarser, and what
-# lies below is rounding noise that would not compress.
-_STRESS_RESOLUTION = 2.0 ** -20
+# Single-precision fields are kept to this fraction of each mode's largest entry: shapes to what single precision gives that entry,
+# stress to 1.5e-5, a hundredth of its discretisation error. What lies below is noise that would not compress.
+_DISPLACEMENT_RESOLUTION = 2.0 ** -24
+_STRESS_RESOLUTION = 2.0 ** -16
 # Version of the VTKHDF layout whose unstructured grids are written.
 _VTKHDF_VERSION = (2, 0)
 
@@ -94,10 +95,18 @@ def _write_modes(file, data, order):
     _set_text(file.create_group("modes/stress"), location=data.stress_location, components="xx yy zz xy yz xz",
               unit="Pa per unit modal coordinate (kg^0.5 m)")
     for mode in range(len(data.frequency)):
-        put(file, f"modes/displacement/{mode:04d}", data.displacement[mode][order], data.displacement_precision)
+        shape = data.displacement[mode][order]
+        if data.displacement_precision == "f4":
+            shape = _rounded(shape, _DISPLACEMENT_RESOLUTION)
+        put(file, f"modes/displacement/{mode:04d}", shape, data.displacement_precision)
         stress = data.stress[mode][order] if data.stress_location == "node" else data.stress[mode]
-        step = np.abs(stress).max() * _STRESS_RESOLUTION
-        put(file, f"modes/stress/{mode:04d}", np.round(stress / step) * step, "f4")
+        put(file, f"modes/stress/{mode:04d}", _rounded(stress, _STRESS_RESOLUTION), "f4")
+
+
+def _rounded(values, resolution):
+    # A step that is a power of two keeps the rounded values exact in binary.
+    step = 2.0 ** np.floor(np.log2(np.abs(values).max() * resolution))
+    return np.round(values / step) * step + 0.0
 
 
 def _write_vtkhdf(file):
