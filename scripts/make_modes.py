@@ -36,6 +36,7 @@ def _arguments(argv):
     override = parser.add_argument_group("overrides, for every body that is made")
     override.add_argument("--modes", metavar="N", type=int, help="normal or fixed-interface modes")
     override.add_argument("--mesh", metavar=("NX", "NY", "NZ"), nargs=3, type=int, help="elements along, across and through the body")
+    override.add_argument("--end-refinement", metavar="FRACTION", type=float, help="how much shorter elements are at both ends (0: even)")
     override.add_argument("--element", choices=parameters.ELEMENTS, help="hex27: 27 nodes; hex20R: 20 nodes, reduced stiffness")
     override.add_argument("--boundary", choices=parameters.BOUNDARIES, help="mode set")
     override.add_argument("--damping-ratio", metavar="ZETA", type=float, help="damping ratio of every mode")
@@ -48,7 +49,7 @@ def _bodies(arguments):
     unknown = [name for name in arguments.names if name not in tables]
     if unknown:
         raise ParameterError(f"{unknown[0]}: no such body in {arguments.parameters}; it has {', '.join(tables)}")
-    keys = ("modes", "mesh", "element", "boundary", "damping_ratio", "displacement_precision")
+    keys = ("modes", "mesh", "end_refinement", "element", "boundary", "damping_ratio", "displacement_precision")
     overrides = {key: getattr(arguments, key) for key in keys if getattr(arguments, key) is not None}
     return [parameters.parse_body(name, {**tables[name], **overrides}) for name in dict.fromkeys(arguments.names or tables)]
 

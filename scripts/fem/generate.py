@@ -61,7 +61,8 @@ def write(body, folder, advance=lambda: None):
         rules = validate.validate(partial)
         broken = [str(rule) for rule in rules if not rule.holds]
         if broken:
-            raise ModelError(f"{body.name}: the modal file breaks rules of its schema; a finer mesh or fewer modes may help:\n  "
+            raise ModelError(f"{body.name}: the modal file breaks rules of its schema; a finer mesh, "
+                             "shorter elements at the ends (end_refinement) or fewer modes may help:\n  "
                              + "\n  ".join(broken))
         os.replace(partial, path)
     finally:

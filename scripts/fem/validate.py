@@ -126,7 +126,7 @@ class _Contents:
         self.root = self.interfaces[_text(file, "root_interface")]
         self.geometric = file["geometric/stiffness"][()] if "geometric" in file else None
         self.size = np.abs(self.points).max()
-        self.largest_inertia = np.linalg.eigvalsh(self.inertia).max()
+        self.largest_inertia = np.abs(np.linalg.eigvalsh(self.inertia)).max()
 
     def rules(self):
         """All rules on numbers."""
