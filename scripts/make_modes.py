@@ -20,7 +20,7 @@ examples:
   make_modes.py panel_cantilever --mesh 40 20 1     a finer mesh
   make_modes.py --readme                            modes/README.md anew from the files
 
-exit status: 0 done; 1 a body could not be solved or breaks a rule; 2 a parameter cannot be used
+exit status: 0 done; 1 a body could not be solved, breaks a rule or cannot be written; 2 a parameter cannot be used
 """
 
 
@@ -29,14 +29,14 @@ def _arguments(argv):
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("names", metavar="NAME", nargs="*", help="bodies to make; all of the parameter file if none is named")
     parser.add_argument("--list", action="store_true", help="list the bodies of the parameter file and stop")
-    parser.add_argument("--readme", action="store_true", help="write README.md of the output folder from the files in it, make nothing")
+    parser.add_argument("--readme", action="store_true", help="write README.md of the output folder from its files, make nothing")
     parser.add_argument("--out", metavar="DIR", type=Path, default=_MODES_FOLDER, help="folder for the files (default: the project's modes/)")
     parser.add_argument("--parameters", metavar="FILE", type=Path, default=_MODES_FOLDER / "bodies.toml",
                         help="TOML file with one table per body (default: modes/bodies.toml)")
     override = parser.add_argument_group("overrides, for every body that is made")
     override.add_argument("--modes", metavar="N", type=int, help="normal or fixed-interface modes")
     override.add_argument("--mesh", metavar=("NX", "NY", "NZ"), nargs=3, type=int, help="elements along, across and through the body")
-    override.add_argument("--end-refinement", metavar="FRACTION", type=float, help="how much shorter elements are at both ends (0: even)")
+    override.add_argument("--end-refinement", metavar="FRACTION", type=float, help="how much shorter elements are at the ends (0: even)")
     override.add_argument("--element", choices=parameters.ELEMENTS, help="hex27: 27 nodes; hex20R: 20 nodes, reduced stiffness")
     override.add_argument("--boundary", choices=parameters.BOUNDARIES, help="mode set")
     override.add_argument("--damping-ratio", metavar="ZETA", type=float, help="damping ratio of every mode")
@@ -90,7 +90,7 @@ def main(argv=None):
     except ParameterError as error:
         print(f"make_modes.py: {error}", file=sys.stderr)
         return 2
-    except ModelError as error:
+    except (ModelError, OSError) as error:
         print(f"make_modes.py: {error}", file=sys.stderr)
         return 1
     return 0

@@ -29,11 +29,6 @@ class InertiaIntegrals:
         """Rotational inertia about the origin (3,3) in kg m2."""
         return np.trace(self.squared_moment) * np.eye(3) - self.squared_moment
 
-    @property
-    def angular_momentum(self):
-        """(n,3) = int rho r x phi_j."""
-        return np.stack([self.first_moment[:, a, b] - self.first_moment[:, b, a] for a, b in ((1, 2), (2, 0), (0, 1))], axis=1)
-
 
 def integrals(points, displacements, apply_mass):
     """Integrals of points (N,3) with displacements (n,N,3); apply_mass maps (N,m) to the mass matrix times it."""

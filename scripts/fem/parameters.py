@@ -48,8 +48,9 @@ class Body:
     """One modal file. Lengths in m; x along the body from the root, y across, z through the thickness.
 
     `mesh` counts elements along x, y, z; the elements at both ends in x are shorter than the mean by the fraction
-    `end_refinement`, since clamps and hinges bend a body over a short length. `modes` counts normal (fixed-interface) modes; Craig-Bampton adds six constraint modes for every interface,
-    free-free six attachment modes for every interface including the root.
+    `end_refinement`, since clamps and hinges bend a body over a short length. `modes` counts normal (fixed-interface)
+    modes; Craig-Bampton adds six constraint modes for every interface, free-free six attachment modes for every
+    interface including the root.
     """
     name: str
     title: str

@@ -44,7 +44,8 @@ def summarise(body, path):
     """Summary of the file `path` that was made from `body`."""
     path = Path(path)
     with h5py.File(path) as file:
-        frequency, kind, mass, inertia = (file[name][()] for name in ("modes/frequency", "modes/kind", "body/mass", "body/inertia"))
+        frequency, kind = file["modes/frequency"][()], file["modes/kind"][()]
+        mass, inertia = file["body/mass"][()], file["body/inertia"][()]
         first, second = file["inertia/first_moment"][()], file["inertia/second_moment"][()]
         angular = np.stack([first[:, a, b] - first[:, b, a] for a, b in ((1, 2), (2, 0), (0, 1))], axis=1)
         effective = 100 * np.hstack([file["inertia/momentum"][()] ** 2 / mass, angular ** 2 / np.diag(inertia)])
@@ -54,7 +55,8 @@ def summarise(body, path):
             reference=structures.reference_name(body), node_count=int(file.attrs["node_count"]), bytes=path.stat().st_size,
             mass=float(mass), center_of_mass=file["body/center_of_mass"][()], inertia=inertia, frequency=frequency, kind=kind,
             families=families, theory=_theory(body, families, len(frequency)), effective=effective,
-            interfaces={name: (group.attrs["coupling"].decode(), group["position"][()]) for name, group in file["interfaces"].items()})
+            interfaces={name: (group.attrs["coupling"].decode(), group["position"][()])
+                        for name, group in file["interfaces"].items()})
 
 
 def _theory(body, families, count):
@@ -90,24 +92,27 @@ def terminal(summary, rules):
         lines.append(f"  {mode + 1:4d} {_KIND[summary.kind[mode]]:13s} {summary.families[mode]:8s} {frequency:8.3f} {against}  {shares}")
     lines.append(f"  {len(rules)} rules hold; nearest to their limits:")
     graded = sorted((rule for rule in rules if 0 < rule.limit < 1), key=lambda rule: -rule.value / rule.limit)
-    lines += [f"    {rule}" for rule in graded[:4]]
+    lines += [f"    {rule}{', above the level of warning' if rule.doubtful else ''}" for rule in graded[:4]]
     return "\n".join(lines)
 
 
 def readme(summaries):
     """Text of modes/README.md."""
     lines = ["# Modal files", "",
-             "Written by `scripts/make_modes.py --readme` from the files and `bodies.toml`; schema `flexible-body-modes` 1.0. Every file is made by",
-             "`scripts/make_modes.py NAME`. `NAME.xdmf` (one grid) and `NAME.modes.xdmf` (one step per mode) open it in meshio, VTK and ParaView.", "",
+             "Written by `scripts/make_modes.py --readme` from the files and `bodies.toml`; schema `flexible-body-modes` 1.0.",
+             "`scripts/make_modes.py NAME` makes one of them, without NAME all. `NAME.xdmf` (one grid) and `NAME.modes.xdmf` (one step per",
+             "mode) open it in meshio, VTK and ParaView.", "",
              "| file | structure | mode set | mass kg | first to last Hz | interfaces | made by |", "|---|---|---|---|---|---|---|"]
     for item in summaries:
         places = "; ".join(f"{name} ({coupling}) at x = {position[0]:g} m" for name, (coupling, position) in item.interfaces.items())
         lines.append(f"| `{item.name}.h5` | {item.title} | {item.boundary}: {_mode_set(item)} | {item.mass:.6g} | "
                      f"{item.frequency[0]:.4g} to {item.frequency[-1]:.4g} | {places} | `make_modes.py {item.name}` |")
     lines += ["", "## Frequencies against theory", "",
-              "Theory is independent of the solid model: Legendre-Ritz for beams and plates, closed form for rods, Saint-Venant torsion. Errors",
-              "of clamped bodies contain the clamped face's restraint of lateral contraction, which beam and plate theory do not have. Modes without",
-              "theory are not listed: in-plane modes of panels, attachment modes, and the upper modes of Craig-Bampton sets.", ""]
+              "Theory is independent of the solid model: Legendre-Ritz for beams and plates, closed form for rods, Saint-Venant torsion.",
+              "Errors of clamped bodies contain the clamped face's restraint of lateral contraction and of warping, which beam and plate",
+              "theory do not have. Modes without theory are not listed: in-plane modes of panels, attachment modes, and the upper modes of",
+              "Craig-Bampton sets. Effective masses are relative to the mass, effective inertias to the inertia about the root; both are",
+              "zero for free bodies, whose modes carry no momentum.", ""]
     for item in summaries:
         listed = np.flatnonzero(np.isfinite(item.theory))
         lines += [f"### {item.name}", "", f"Theory: {item.reference}.", "",
@@ -115,8 +120,8 @@ def readme(summaries):
                   "|---|---|---|---|---|---|---|"]
         for mode in listed:
             shares = [f"{value:.2f}" for value in item.effective[mode]]
-            lines.append(f"| {mode + 1} | {item.families[mode]} | {item.frequency[mode]:.4f} | {item.theory[mode]:.4f} | {item.error[mode]:+.3f} | "
-                         f"{', '.join(shares[:3])} | {', '.join(shares[3:])} |")
+            lines.append(f"| {mode + 1} | {item.families[mode]} | {item.frequency[mode]:.4f} | {item.theory[mode]:.4f} | "
+                         f"{item.error[mode]:+.3f} | {', '.join(shares[:3])} | {', '.join(shares[3:])} |")
         total = [f"{value:.2f}" for value in item.effective.sum(0)]
         lines += [f"| all {len(item.frequency)} | | | | | {', '.join(total[:3])} | {', '.join(total[3:])} |", ""]
     return "\n".join(lines).rstrip() + "\n"

@@ -48,13 +48,13 @@ def test_a_parameter_that_cannot_be_used_is_refused_with_status_2_naming_the_key
     assert list(tmp_path.glob("*.h5*")) == []
 
 
-def test_a_missing_key_an_unknown_body_and_a_missing_file_are_refused_by_name(tmp_path, capsys):
+def test_a_missing_key_an_unknown_body_and_a_missing_file_are_refused_by_name(modes_folder, bodies, tmp_path, capsys):
     path = tmp_path / "bodies.toml"
     path.write_text("[body]\nkind = 'boom'\n")
     assert refused(["--parameters", str(path)], capsys)[1].startswith("make_modes.py: body.thickness: missing")
-    assert refused(["nobody"], capsys) == (2, f"make_modes.py: nobody: no such body in {make_modes._MODES_FOLDER / 'bodies.toml'}; it has "
-                                           "boom_cantilever, boom_craig_bampton, panel_cantilever, panel_free_free, panel_craig_bampton, "
-                                           "panel_sandwich\n")
+    status, message = refused(["nobody"], capsys)
+    assert status == 2
+    assert message == f"make_modes.py: nobody: no such body in {modes_folder / 'bodies.toml'}; it has {', '.join(bodies)}\n"
     status, message = refused(["--parameters", str(tmp_path / "absent.toml")], capsys)
     assert status == 2 and "absent.toml" in message
 

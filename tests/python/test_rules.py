@@ -14,6 +14,13 @@ def test_every_committed_file_keeps_every_rule(name, modes_folder):
     assert [str(rule) for rule in rules if not rule.holds] == []
 
 
+def test_warnings_are_confined_to_the_lumped_mass_of_free_modes(name, bodies, modes_folder):
+    # Attachment modes bend the panel over a few elements, where lumped and consistent mass differ by 3e-3; the tensors in use
+    # come from the consistent mass.
+    doubtful = [rule.name for rule in validate.validate(modes_folder / f"{name}.h5") if rule.doubtful]
+    assert doubtful == (["lumped orthonormality"] if bodies[name].boundary == "free-free" else [])
+
+
 def test_digest_does_not_depend_on_the_view_for_vtk(modes_folder, tmp_path):
     path = tmp_path / "copy.h5"
     shutil.copy(modes_folder / "boom_cantilever.h5", path)
@@ -38,6 +45,10 @@ def _scale(dataset, factor):
     dataset[...] = dataset[()] * factor
 
 
+def _reverse(dataset, axis=0):
+    dataset[...] = np.flip(dataset[()], axis)
+
+
 def _swap_frequencies(file):
     file["modes/frequency"][:2] = file["modes/frequency"][:2][::-1]
 
@@ -51,7 +62,7 @@ DAMAGES = {
     "lumped orthonormality": lambda file: _scale(file["modes/displacement/0001"], 1.01),
     "root nodes do not move": _move_root,
     "node masses sum to the mass": lambda file: _scale(file["mesh/node_mass"], 1.001),
-    "node masses balance about the centre of mass": lambda file: file["mesh/node_mass"].write_direct(file["mesh/node_mass"][()][::-1].copy()),
+    "node masses balance about the centre of mass": lambda file: _reverse(file["mesh/node_mass"]),
     "frequencies positive and ascending": _swap_frequencies,
     "central inertia positive definite": lambda file: _scale(file["body/inertia"], -1),
     "centre of mass inside the bounding box": lambda file: file["body/center_of_mass"].write_direct(np.array([99.0, 0, 0])),
@@ -63,7 +74,7 @@ DAMAGES = {
     "interface tip: weights sum to one": lambda file: _scale(file["interfaces/tip/weights"], 1 + 1e-9),
     "geometric stiffness symmetric": lambda file: file["geometric/stiffness"].__setitem__((8, 0, 1), 1e6),
     "lumped inertia": lambda file: _scale(file["mesh/points"], 1000),
-    "surface triangles face outward": lambda file: file["mesh/surface_triangles"].write_direct(file["mesh/surface_triangles"][()][:, ::-1].copy()),
+    "surface triangles face outward": lambda file: _reverse(file["mesh/surface_triangles"], axis=1),
 }
 
 
