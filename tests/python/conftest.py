@@ -48,7 +48,7 @@ def stored():
 
 @pytest.fixture
 def computed():
-    """name -> ModalData computed anew, once per session."""
+    """name -> ModalData computed anew, once for all tests."""
     return _computed
 
 

@@ -6,8 +6,10 @@ fully clamped face cost. Solids are stiffer than theory, so errors of hex27 are 
 """
 import numpy as np
 import pytest
+from scipy.sparse.linalg import eigsh
 
-from fem import report, theory
+from fem import parameters, reduction, report, structures, theory
+from fem.modes import RootHeld
 
 
 @pytest.fixture
@@ -115,3 +117,53 @@ def test_a_rigid_edge_leaves_the_plate_three_rigid_motions_and_lies_between_free
     # Interlacing: a rigid edge only constrains the free plate, and a clamp takes three further freedoms of bending.
     assert (rigid >= free * (1 - 1e-9)).all()
     assert (rigid >= clamped[:4]).all() and (rigid <= clamped[3:] * (1 + 1e-9)).all()
+
+
+TABLE_PANEL = {"length": 1.5, "material": {"young_modulus": 70e9, "poisson_ratio": 0.3, "density": 2700.0}, "end_refinement": 0.0,
+               "interfaces": {"outboard": {}}}
+
+
+@pytest.mark.parametrize("base, change, family, bounds", [
+    ("boom_cantilever", {"mesh": [20, 2, 2]}, "flap", [0.52, 0.64, 0.87]),
+    ("boom_cantilever", {"mesh": [20, 2, 2], "element": "hex20R"}, "flap", [0.29, 0.29, 0.30]),
+    ("panel_cantilever", {**TABLE_PANEL, "mesh": [12, 8, 1]}, "bending", [2.1] * 6),
+    ("panel_cantilever", {**TABLE_PANEL, "mesh": [24, 16, 1]}, "bending", [0.45] * 6),
+    ("panel_free_free", {**TABLE_PANEL, "mesh": [24, 16, 1]}, "bending", [0.45] * 6),
+    ("panel_sandwich", {"length": 1.5, "mesh": [12, 8, 3], "interfaces": {"outboard": {}}}, "bending", [0.06] * 6),
+])
+def test_other_meshes_reach_the_errors_known_for_them(base, change, family, bounds, tables):
+    # A free panel with a rigid edge is restrained along it like a clamped one and has the clamped bound.
+    body = parameters.parse_body(base, {**tables[base], **change, "modes": 8})
+    solid, root, others = structures.build(body)
+    held = RootHeld(solid, root)
+    if body.boundary == "free-free":
+        modes = reduction.free_free(solid, held, root, others, body.modes)
+    else:
+        modes = reduction.cantilever(solid, held, body.modes)
+    frequency = in_family(body, solid, modes.squared_frequency, modes.shapes, family)[:len(bounds)]
+    reference = structures.reference_frequencies(body, len(bounds))[family]
+    # Bounds are quoted to two digits: half a unit of the last one is added.
+    margin = np.where(np.array(bounds) > 1, 0.05, 0.005)
+    assert (100 * np.abs(frequency / reference - 1) <= bounds + margin).all()
+
+
+@pytest.mark.parametrize("mesh, bound", [([12, 8, 1], 1.0 + 0.05), ([24, 16, 1], 0.20 + 0.005)])
+def test_a_panel_without_any_support_has_six_rigid_motions_and_the_error_known_for_its_mesh(mesh, bound, tables):
+    # The solid alone, by a shifted eigenproblem that shares nothing with the reductions; the shift is that of the first elastic mode.
+    body = parameters.parse_body("panel_free_free", {**tables["panel_free_free"], **TABLE_PANEL, "mesh": mesh})
+    solid, _, _ = structures.build(body)
+    reference = theory.mindlin_frequencies(structures.plate_section(body), body.length, body.width, 6, "free")
+    shift = (2 * np.pi * reference[0]) ** 2
+    squared, shapes = eigsh(solid.stiffness_matrix, k=14, M=solid.mass_matrix, sigma=-shift, v0=np.ones(3 * solid.node_count))
+    order = np.argsort(squared)
+    squared, shapes = squared[order], shapes[:, order]
+    assert np.abs(squared[:6]).max() < 1e-6 * shift < squared[6]
+    frequency = in_family(body, solid, squared[6:], shapes[:, 6:], "bending")[:6]
+    assert 100 * np.abs(frequency / reference - 1).max() <= bound
+
+
+def in_family(body, solid, squared, shapes, family):
+    """Frequencies in Hz of the modes of one family."""
+    fields = shapes.reshape(-1, 3, len(squared))
+    energy = np.einsum("iaj,iaj->ja", fields, (solid.mass_matrix @ shapes).reshape(fields.shape))
+    return np.sqrt(squared[[own == family for own in structures.families(body, energy)]]) / (2 * np.pi)
