@@ -98,7 +98,7 @@ pub enum ModalFileError {
     },
     /// A compression filter outside the schema.
     #[error(
-        "{}: {object}: found the filters {found}, expected at most shuffle, gzip and fletcher32, each once; repack the file (h5repack -f SHUF -f GZIP=4)",
+        "{}: {object}: found the filters {found}, expected at most shuffle, gzip and fletcher32, each once and in this order; repack the file (h5repack -f SHUF -f GZIP=4)",
         file.display()
     )]
     Filter {

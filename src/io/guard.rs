@@ -4,6 +4,7 @@
 //! then the declared size against the expectation, the file's own length and the limits below, then that all storage is there, and only then the read.
 
 use super::array::{ElementType, GuardedDataset};
+use super::chunks::check_chunks;
 use super::error::ModalFileError;
 use hdf5::filters::Filter;
 use hdf5::types::{FixedAscii, FixedUnicode, FloatSize, IntSize, TypeDescriptor};
@@ -180,7 +181,9 @@ impl GuardedFile {
         let deflates = count(|f| matches!(f, Filter::Deflate(_)));
         let shuffles = count(|f| matches!(f, Filter::Shuffle));
         let checksums = count(|f| matches!(f, Filter::Fletcher32));
-        if deflates + shuffles + checksums != filters.len() || deflates.max(shuffles).max(checksums) > 1 {
+        // the checksum comes last in writing, so that it is the first to see damaged bytes
+        let checksum_last = checksums == 0 || matches!(filters.last(), Some(Filter::Fletcher32));
+        if deflates + shuffles + checksums != filters.len() || deflates.max(shuffles).max(checksums) > 1 || !checksum_last {
             return Err(ModalFileError::Filter { file: self.path.clone(), object: path.to_owned(), found: format!("{filters:?}") });
         }
 
@@ -207,11 +210,7 @@ impl GuardedFile {
             if expected > CHUNK_COUNT_LIMIT {
                 return Err(incomplete(format!("{expected} chunks"), format!("at most {CHUNK_COUNT_LIMIT} chunks")));
             }
-            let found = dataset.num_chunks();
-            if found.map(|n| n as u64) != Some(expected) {
-                let found = found.map_or("no readable index".to_owned(), |n| format!("{n} chunks"));
-                return Err(incomplete(found, format!("{expected} chunks")));
-            }
+            check_chunks(dataset, &shape, &chunk, &filters, element.bytes(), self.bytes).map_err(|f| incomplete(f.found, f.expected))?;
         } else if dataset.storage_size() < bytes {
             return Err(incomplete(format!("{} bytes", dataset.storage_size()), format!("{bytes} bytes")));
         }

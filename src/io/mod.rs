@@ -1,6 +1,6 @@
 //! Files to model types and back: the only layer that opens HDF5 files. It holds no physics and uses `model` alone.
 //!
-//! A modal file (schema `flexible-body-modes` 1.0) comes from elsewhere and is never trusted: [`guard`] decides what may be read
+//! A modal file (schema `flexible-body-modes` 1.0) comes from elsewhere and is never trusted: `guard` decides what may be read
 //! at all, [`modal_file`] turns datasets into a [`crate::model::modal_body::ModalBody`], [`modal_mesh`] reads the per-node data that
 //! only pictures and point loads need, and [`modal_check`] holds the file against every rule of the schema. A file that breaks
 //! a rule is refused; nothing is filled in or repaired.
@@ -12,6 +12,7 @@
 //! all. libhdf5 is C code that has looped on damaged variable-length data, so those types are refused by their descriptor before any read.
 
 mod array;
+mod chunks;
 mod digest;
 pub mod error;
 mod guard;
