@@ -343,3 +343,21 @@ impl HealthReport {
         self.with_verdict(Verdict::Fail).next().is_none()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_rule_stands_once_and_in_order() {
+        assert!(Rule::ALL.windows(2).all(|pair| pair[0] < pair[1]));
+        let mut names: Vec<&str> = Rule::ALL.iter().map(|rule| rule.name()).collect();
+        names.sort_unstable();
+        assert!(names.windows(2).all(|pair| pair[0] != pair[1]));
+    }
+
+    #[test]
+    fn a_figure_that_is_not_a_number_holds_no_bound() {
+        assert!([Bound::AtMost(1.0), Bound::AtLeast(1.0), Bound::MoreThan(1.0)].iter().all(|bound| !bound.holds(f64::NAN)));
+    }
+}

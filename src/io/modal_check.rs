@@ -8,7 +8,7 @@ use super::error::ModalFileError;
 use super::header::NodeMassKind;
 use super::health::{Bound, HealthReport, Rule, RuleResult, Verdict};
 use super::lumped::LumpedSums;
-use super::modal_file::{InterfaceSupport, ModalFile};
+use super::modal_file::{InterfaceSupport, MODAL_MASS_LIMIT, ModalFile};
 use crate::model::modal_body::{Boundary, ModalBody};
 use nalgebra::{DMatrix, Matrix3, SymmetricEigen, Vector3};
 use std::path::Path;
@@ -151,7 +151,7 @@ fn read_and_judge(path: &Path, rows: &mut Rows) -> Result<(ModalFile, ModalBody)
 
     judge_modes(rows, &body);
     judge_rigid(rows, &body, &sums);
-    judge_integrals(rows, &body);
+    judge_integrals(rows, &body, file.read_modal_mass_departure()?);
     judge_lumped(rows, &file, &body, &sums);
     judge_boundary(rows, &body, &sums);
     judge_interfaces(rows, &body, &supports, &sums);
@@ -181,7 +181,11 @@ fn check_counts(file: &ModalFile) -> Result<(), ModalFileError> {
     for quantity in ["displacement", "rotation", "stress"] {
         let group = format!("modes/{quantity}");
         let found = file.file.children(&group).len();
-        let needed = quantity == "displacement" || file.file.has(&group);
+        if quantity == "displacement" && !file.file.has(&group) {
+            let expected = "a group with one dataset per mode".to_owned();
+            return Err(ModalFileError::Missing { file: file.path().to_owned(), object: group, expected });
+        }
+        let needed = file.file.has(&group);
         if needed && found != n {
             let (path, expected) = (file.path().to_owned(), format!("{n}: one dataset per mode"));
             return Err(ModalFileError::WrongShape { file: path, object: group, found: format!("{found} datasets"), expected });
@@ -238,14 +242,14 @@ fn judge_rigid(rows: &mut Rows, body: &ModalBody, sums: &LumpedSums) {
     );
 }
 
-fn judge_integrals(rows: &mut Rows, body: &ModalBody) {
+fn judge_integrals(rows: &mut Rows, body: &ModalBody, modal_mass_departure: Option<f64>) {
     let n = body.mode_count();
     let trace = DMatrix::from_fn(n, n, |j, k| body.second_moment[j * n + k].trace());
-    // with rotary inertia the trace is only the translational share, and modal_mass has been held against the identity on reading
-    if body.angular_momentum.is_some() {
-        rows.held(Rule::Orthonormality, "inertia/modal_mass is the identity".to_owned());
-    } else {
-        rows.judge(Rule::Orthonormality, "inertia/second_moment", (trace - DMatrix::identity(n, n)).amax(), Bound::AtMost(1e-6));
+    // with rotary inertia the trace is only the translational share of the modal mass
+    let limit = Bound::AtMost(MODAL_MASS_LIMIT);
+    match modal_mass_departure {
+        Some(departure) => rows.judge(Rule::Orthonormality, "inertia/modal_mass", departure, limit),
+        None => rows.judge(Rule::Orthonormality, "inertia/second_moment", (trace - DMatrix::identity(n, n)).amax(), limit),
     }
     let mirrored = |j: usize, k: usize| (body.second_moment[j * n + k] - body.second_moment[k * n + j].transpose()).amax();
     let worst = (0..n).flat_map(|j| (0..j + 1).map(move |k| (j, k))).map(|(j, k)| mirrored(j, k)).fold(0.0, f64::max);

@@ -3,6 +3,7 @@
 //! Shapes below use N nodes and n modes. Nothing per node is kept; `modal_mesh` reads that on demand.
 
 use super::array::{ElementType, GuardedDataset};
+use super::digest::read_content;
 use super::error::ModalFileError;
 use super::guard::GuardedFile;
 use super::header::{Header, read_header};
@@ -15,7 +16,7 @@ use std::path::Path;
 pub const GEOMETRIC_LOADS: [&str; 12] =
     ["acc_x", "acc_y", "acc_z", "alpha_x", "alpha_y", "alpha_z", "omega_xx", "omega_yy", "omega_zz", "omega_xy", "omega_yz", "omega_xz"];
 /// Largest departure of `inertia/modal_mass` from the identity: that of the orthonormality rule.
-const MODAL_MASS_LIMIT: f64 = 1e-6;
+pub(super) const MODAL_MASS_LIMIT: f64 = 1e-6;
 
 /// What kind of shape a mode is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -122,6 +123,14 @@ impl ModalFile {
         &self.header
     }
 
+    /// Digest of the data as it is now, to be compared with [`Header::content_sha256`]; reads every dataset.
+    ///
+    /// # Errors
+    /// If a dataset has a type, size or storage outside the schema, or is damaged.
+    pub fn content_sha256(&self) -> Result<String, ModalFileError> {
+        Ok(read_content(&self.file)?.sha256)
+    }
+
     /// Reads the modal integrals, interfaces and stiffness matrices; types, shapes and finiteness are checked, the other rules are not.
     ///
     /// # Errors
@@ -135,7 +144,7 @@ impl ModalFile {
         let momentum = self.sized("inertia/momentum", &[n, 3], "(modes, 3)")?.read_f64()?;
         let first_moment = self.sized("inertia/first_moment", &[n, 3, 3], "(modes, 3, 3)")?.read_f64()?;
         let second_moment = self.sized("inertia/second_moment", &[n, n, 3, 3], "(modes, modes, 3, 3)")?.read_f64()?;
-        self.refuse_modal_mass()?;
+        self.read_modal_mass_departure()?;
         Ok(ModalBody {
             mass: scalar.first().copied().unwrap_or(f64::NAN),
             center_of_mass: Vector3::from_column_slice(&center),
@@ -254,20 +263,20 @@ impl ModalFile {
         }
     }
 
-    /// The equations take the modal mass as one.
-    fn refuse_modal_mass(&self) -> Result<(), ModalFileError> {
+    /// Largest departure of `inertia/modal_mass` from the identity, where the file has it; the equations take the modal mass as one.
+    pub(super) fn read_modal_mass_departure(&self) -> Result<Option<f64>, ModalFileError> {
         let n = self.header.mode_count;
-        let Some(values) = self.optional("inertia/modal_mass", &[n, n], "(modes, modes)")? else { return Ok(()) };
-        let departure = (DMatrix::from_row_slice(n, n, &values) - DMatrix::identity(n, n)).amax();
-        if departure <= MODAL_MASS_LIMIT {
-            return Ok(());
+        let values = self.optional("inertia/modal_mass", &[n, n], "(modes, modes)")?;
+        let departure = values.map(|values| (DMatrix::from_row_slice(n, n, &values) - DMatrix::identity(n, n)).amax());
+        match departure.filter(|departure| *departure > MODAL_MASS_LIMIT) {
+            None => Ok(departure),
+            Some(departure) => Err(self.wrong_value(
+                "inertia/modal_mass",
+                &format!("a departure of {departure:.3e} from the identity"),
+                &format!("at most {MODAL_MASS_LIMIT:e}"),
+                "orthonormalise the modes with the whole mass matrix, rotary inertia included",
+            )),
         }
-        Err(self.wrong_value(
-            "inertia/modal_mass",
-            &format!("a departure of {departure:.3e} from the identity"),
-            &format!("at most {MODAL_MASS_LIMIT:e}"),
-            "orthonormalise the modes with the whole mass matrix, rotary inertia included",
-        ))
     }
 
     fn read_interface(&self, name: &str) -> Result<Interface, ModalFileError> {
