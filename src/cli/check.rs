@@ -40,11 +40,16 @@ fn check_modal_file(file: &Path, _: &mut dyn Write) -> Result<(serde_json::Value
 
 #[cfg(feature = "hdf5")]
 fn check_modal_file(file: &Path, output: &mut dyn Write) -> Result<(serde_json::Value, Vec<String>), Failure> {
+    use crate::io::Verdict;
     let examination = crate::io::examine(file);
     let messages = examination.messages();
     let verdict = if messages.is_empty() { "accepted" } else { "refused" };
     writeln!(output, "{}: {verdict}", file.display())?;
     health::table(&examination.report).write(output)?;
+    let unreached = examination.report.with_verdict(Verdict::NotReached).count();
+    if unreached > 0 {
+        writeln!(output, "  {unreached} further rules were not reached")?;
+    }
     writeln!(output)?;
     let object = serde_json::json!({
         "file": file.to_string_lossy(),
@@ -59,14 +64,14 @@ fn check_modal_file(file: &Path, output: &mut dyn Write) -> Result<(serde_json::
 #[cfg(feature = "hdf5")]
 pub mod health {
     use crate::cli::report::{Align, Table};
-    use crate::io::{HealthReport, RuleResult};
+    use crate::io::{Bound, HealthReport, RuleResult, Verdict};
 
-    /// One row per rule: figure, limit, verdict, object, what the rule protects.
+    /// One row per rule that was evaluated: figure, limit, verdict, object, what the rule protects.
     pub fn table(report: &HealthReport) -> Table {
         let (left, right) = (Align::Left, Align::Right);
         let mut table =
             Table::new(&[("rule", left), ("figure", right), ("limit", left), ("verdict", left), ("protects", left), ("remark", left)]);
-        for row in &report.rows {
+        for row in report.rows.iter().filter(|row| row.verdict != Verdict::NotReached) {
             table.row([
                 row.rule.name().to_owned(),
                 row.figure.map_or("-".to_owned(), |figure| format!("{figure:.2e}")),
@@ -94,7 +99,7 @@ pub mod health {
     /// Where the figure is from, and what it cannot say; the message of a broken rule goes to standard error in full.
     fn remark(row: &RuleResult) -> String {
         match (&row.note, row.object.as_str()) {
-            (Some(_), "") if row.verdict == crate::io::Verdict::Fail => "see the message".to_owned(),
+            (Some(_), "") if row.verdict == Verdict::Fail => "see the message".to_owned(),
             (Some(note), "") => note.clone(),
             (Some(note), object) => format!("{object}: {note}"),
             (None, object) => object.to_owned(),
@@ -109,8 +114,8 @@ pub mod health {
                 "protects": row.rule.protects(),
                 "object": row.object,
                 "figure": row.figure,
-                "relation": row.bound.map(crate::io::Bound::relation),
-                "limit": row.bound.map(crate::io::Bound::limit),
+                "relation": row.bound.map(Bound::relation),
+                "limit": row.bound.map(Bound::limit),
                 "verdict": row.verdict.word(),
                 "note": row.note,
             })

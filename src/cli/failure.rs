@@ -1,7 +1,5 @@
 //! How a command ends when it does not end well.
 
-use std::error::Error;
-use std::fmt::Write as _;
 use std::io::{self, ErrorKind, Write as _};
 use std::process::ExitCode;
 
@@ -52,7 +50,9 @@ impl From<io::Error> for Failure {
 }
 
 /// An error and its causes in one text.
-pub fn with_causes(error: &dyn Error) -> String {
+#[cfg(feature = "hdf5")]
+pub fn with_causes(error: &dyn std::error::Error) -> String {
+    use std::fmt::Write as _;
     let mut text = error.to_string();
     let mut cause = error.source();
     while let Some(inner) = cause {

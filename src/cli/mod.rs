@@ -1,13 +1,15 @@
 //! The command line: the only layer that prints, parses arguments and chooses exit codes.
 //!
 //! Results go to standard output, messages to standard error. Each subcommand has a file with one function that writes to a given
-//! sink and returns a [`failure::Failure`]; `args` holds clap's structs and nothing else.
+//! sink and returns a `Failure`; `args` holds clap's structs and nothing else.
+//! A new subcommand is one variant of [`args::Command`], one file here and one arm of `run`.
 
 pub mod args;
 mod check;
 mod failure;
 #[cfg(feature = "hdf5")]
 mod modes;
+#[cfg(feature = "hdf5")]
 mod report;
 
 use args::{Arguments, Command};

@@ -50,7 +50,6 @@ impl Table {
 }
 
 /// A number in six significant digits, plain where that is short.
-#[cfg(feature = "hdf5")]
 pub fn number(value: f64) -> String {
     let magnitude = value.abs();
     if value == 0.0 {
@@ -77,7 +76,6 @@ mod tests {
         assert_eq!(String::from_utf8(text).unwrap(), "  name    value\n  a        12.5\n  longer\n");
     }
 
-    #[cfg(feature = "hdf5")]
     #[test]
     fn numbers_show_six_digits() {
         assert_eq!([0.0, 3.0, -0.25, 123_456.7, 1e-9].map(number), ["0", "3.00000", "-0.250000", "123457", "1.000e-9"]);
