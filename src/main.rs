@@ -1,1 +1,7 @@
-fn main() {}
+//! The `pliant` program.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    pliant::cli::main()
+}

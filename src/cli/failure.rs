@@ -1,0 +1,70 @@
+//! How a command ends when it does not end well.
+
+use std::io::{self, ErrorKind, Write as _};
+use std::process::ExitCode;
+
+/// Exit code: the input is at fault.
+pub const INPUT: u8 = 2;
+/// Exit code: the run stopped early.
+pub const STOPPED: u8 = 3;
+
+/// Why a command failed.
+#[derive(Debug)]
+pub enum Failure {
+    /// The input is at fault; one message for each fault.
+    Input(Vec<String>),
+    /// The run stopped early; what was computed is kept.
+    #[allow(dead_code, reason = "the commands that simulate return it")]
+    Stopped(String),
+    /// The output cannot be written.
+    Output(io::Error),
+}
+
+impl Failure {
+    /// One fault of the input.
+    pub fn input(message: impl Into<String>) -> Self {
+        Self::Input(vec![message.into()])
+    }
+
+    /// Says on standard error what failed; the exit code of the process. A reader that has closed its end is no failure.
+    pub fn report(&self) -> ExitCode {
+        let (messages, code) = match self {
+            Self::Input(messages) => (messages.clone(), INPUT),
+            Self::Stopped(message) => (vec![message.clone()], STOPPED),
+            Self::Output(error) if error.kind() == ErrorKind::BrokenPipe => return ExitCode::SUCCESS,
+            Self::Output(error) => (vec![format!("cannot write the output: {error}")], 1),
+        };
+        let mut sink = io::stderr().lock();
+        for message in messages {
+            // nothing is left to tell anyone if standard error is closed too
+            let _ = writeln!(sink, "error: {message}");
+        }
+        ExitCode::from(code)
+    }
+}
+
+impl From<io::Error> for Failure {
+    fn from(error: io::Error) -> Self {
+        Self::Output(error)
+    }
+}
+
+/// An error and its causes in one text.
+#[cfg(feature = "hdf5")]
+pub fn with_causes(error: &dyn std::error::Error) -> String {
+    use std::fmt::Write as _;
+    let mut text = error.to_string();
+    let mut cause = error.source();
+    while let Some(inner) = cause {
+        let _ = write!(text, "\n  caused by: {inner}");
+        cause = inner.source();
+    }
+    text
+}
+
+#[cfg(feature = "hdf5")]
+impl From<crate::io::ModalFileError> for Failure {
+    fn from(error: crate::io::ModalFileError) -> Self {
+        Self::input(with_causes(&error))
+    }
+}

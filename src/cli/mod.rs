@@ -1,0 +1,63 @@
+//! The command line: the only layer that prints, parses arguments and chooses exit codes.
+//!
+//! Results go to standard output, messages to standard error. Each subcommand has a file with one function that writes to a given
+//! sink and returns a `Failure`; `args` holds clap's structs and nothing else.
+//! A new subcommand is one variant of [`args::Command`], one file here and one arm of `run`.
+
+pub mod args;
+mod check;
+mod failure;
+#[cfg(feature = "hdf5")]
+mod modes;
+#[cfg(feature = "hdf5")]
+mod report;
+
+use args::{Arguments, Command};
+use clap::{CommandFactory, Parser};
+use failure::Failure;
+use std::io::Write;
+use std::process::ExitCode;
+
+/// Parses the arguments of the process, runs the command and reports its outcome.
+#[must_use]
+pub fn main() -> ExitCode {
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        // help and version also come this way; a closed pipe is no reason to complain about them
+        Err(error) => {
+            let _ = error.print();
+            return ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(failure::INPUT));
+        }
+    };
+    let mut output = std::io::BufWriter::new(std::io::stdout().lock());
+    let outcome = run(arguments, &mut output).and_then(|()| output.flush().map_err(Failure::from));
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            // what was computed is kept and said, also when the command failed
+            let _ = output.flush();
+            failure.report()
+        }
+    }
+}
+
+fn run(arguments: Arguments, output: &mut dyn Write) -> Result<(), Failure> {
+    match arguments.command {
+        None => Ok(write!(output, "{}", Arguments::command().render_help())?),
+        Some(Command::Check(arguments)) => check::run(&arguments, output),
+        #[cfg(feature = "hdf5")]
+        Some(Command::Modes(arguments)) => modes::run(&arguments, output),
+        #[cfg(not(feature = "hdf5"))]
+        Some(Command::Modes(_)) => Err(Failure::input("this build cannot read modal files; build with the feature \"hdf5\"")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_flag_has_a_help_text() {
+        Arguments::command().debug_assert();
+    }
+}

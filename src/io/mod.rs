@@ -1,0 +1,31 @@
+//! Files to model types and back: the only layer that opens HDF5 files. It holds no physics and uses `model` alone.
+//!
+//! A modal file (schema `flexible-body-modes` 1.0) comes from elsewhere and is never trusted: `guard` decides what may be read
+//! at all, [`modal_file`] turns datasets into a [`crate::model::modal_body::ModalBody`], [`modal_mesh`] reads the per-node data that
+//! only pictures and point loads need, and [`modal_check`] holds the file against every rule of the schema. A file that breaks
+//! a rule is refused; nothing is filled in or repaired.
+//!
+//! # Bounds on a damaged file
+//! No dataset above 2 GiB is read, none that declares more than deflate could unpack from the file's own length, and none whose
+//! storage is incomplete or lies outside the file. At any time the reader holds at most one dataset of up to 2 GiB and 256 MiB of mode
+//! shapes besides the modal integrals, and libhdf5 one chunk of up to 256 MiB. The content pass reads at most 16 GiB in
+//! all. libhdf5 is C code that has looped on damaged variable-length data, so those types are refused by their descriptor before any read.
+
+mod array;
+mod chunks;
+mod digest;
+pub mod error;
+mod guard;
+pub mod header;
+pub mod health;
+mod lumped;
+pub mod modal_check;
+pub mod modal_file;
+pub mod modal_mesh;
+
+pub use error::ModalFileError;
+pub use header::{Header, NodeMassKind};
+pub use health::{Bound, HealthReport, Rule, RuleResult, Verdict};
+pub use modal_check::{Examination, examine};
+pub use modal_file::{Coupling, InterfaceSupport, ModalFile, ModeKind};
+pub use modal_mesh::{StressLocation, StressModes, SurfaceMesh};

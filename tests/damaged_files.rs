@@ -1,0 +1,145 @@
+//! Damaged modal files: `pliant check` ends by itself with exit code 0 or 2, says what is wrong, and stays within its memory.
+//!
+//! Each mutant is read by the built program in a process of its own, because a fault of the C library could not be caught otherwise.
+#![cfg(feature = "hdf5")]
+
+use rand::rngs::StdRng;
+use rand::{Rng, SeedableRng};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+/// An undamaged file of this size takes about 10 ms.
+const TIME_LIMIT: Duration = Duration::from_secs(10);
+/// Address space in KiB: the program needs 0.3 GiB, one refused array would be 2 GiB.
+const ADDRESS_SPACE_KIB: u64 = 2 << 20;
+/// Mutants per sample file; about 10 ms each.
+const MUTANTS: usize = 250;
+
+fn data(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name)
+}
+
+/// Runs `pliant check` within the limits; `None` if it had to be stopped.
+fn check(file: &Path) -> Option<Output> {
+    let program = env!("CARGO_BIN_EXE_pliant");
+    let mut command = if cfg!(target_os = "linux") {
+        let mut shell = Command::new("sh");
+        shell.args(["-c", &format!("ulimit -v {ADDRESS_SPACE_KIB}; exec \"$0\" check \"$1\""), program]);
+        shell
+    } else {
+        let mut direct = Command::new(program);
+        direct.arg("check");
+        direct
+    };
+    // the report is about 5 kB, less than a pipe holds, so that nothing has to be drained meanwhile
+    let mut child = command.arg(file).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let start = Instant::now();
+    while child.try_wait().unwrap().is_none() {
+        if start.elapsed() > TIME_LIMIT {
+            child.kill().unwrap();
+            child.wait().unwrap();
+            return None;
+        }
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    Some(child.wait_with_output().unwrap())
+}
+
+/// What is wrong with the outcome, if anything.
+fn complaint(file: &Path) -> Option<String> {
+    let Some(output) = check(file) else { return Some(format!("still running after {TIME_LIMIT:?}")) };
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    match output.status.code() {
+        Some(0) => None,
+        Some(2) if message.starts_with("error: ") && message.contains(&*file.to_string_lossy()) => None,
+        Some(code) => Some(format!("exit code {code}, message {message:?}")),
+        None => Some(format!("ended by a signal: {}, message {message:?}", output.status)),
+    }
+}
+
+/// One seeded kind of damage.
+fn damage(bytes: &mut Vec<u8>, random: &mut StdRng) -> &'static str {
+    let length = bytes.len();
+    let span = |random: &mut StdRng| {
+        let from = random.random_range(0..length);
+        from..(from + random.random_range(1..=512)).min(length)
+    };
+    match random.random_range(0..6) {
+        0 => {
+            bytes.truncate(random.random_range(0..length));
+            "truncated"
+        }
+        1 => {
+            for _ in 0..random.random_range(1..=8) {
+                bytes[random.random_range(0..length)] ^= 1 << random.random_range(0..8);
+            }
+            "bits flipped"
+        }
+        2 => {
+            for _ in 0..random.random_range(1..=4) {
+                bytes[random.random_range(0..length.min(4096))] ^= 1 << random.random_range(0..8);
+            }
+            "bits flipped in the head"
+        }
+        3 => {
+            let span = span(random);
+            bytes[span].fill(0);
+            "block zeroed"
+        }
+        4 => {
+            let from = span(random);
+            let to = random.random_range(0..length - from.len());
+            bytes.copy_within(from, to);
+            "block copied"
+        }
+        _ => {
+            let at = random.random_range(0..length - 8) & !7;
+            let word = [u64::MAX, 1 << 63, 1 << 40, 1 << 31, 0][random.random_range(0..5)];
+            bytes[at..at + 8].copy_from_slice(&word.to_le_bytes());
+            "extreme word"
+        }
+    }
+}
+
+/// Mutants of one sample; all complaints with what reproduces them.
+fn stress(sample: &str, seed: u64) -> Vec<String> {
+    let whole = std::fs::read(data(sample)).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("mutant.h5");
+    let mut random = StdRng::seed_from_u64(seed);
+    let mut complaints = Vec::new();
+    let count = std::env::var("PLIANT_MUTANTS").ok().and_then(|text| text.parse().ok()).unwrap_or(MUTANTS);
+    for index in 0..count {
+        let mut bytes = whole.clone();
+        let kind = damage(&mut bytes, &mut random);
+        std::fs::write(&file, &bytes).unwrap();
+        if let Some(text) = complaint(&file) {
+            if let Ok(keep) = std::env::var("PLIANT_KEEP_MUTANTS") {
+                std::fs::write(Path::new(&keep).join(format!("{seed}_{index}.h5")), &bytes).unwrap();
+            }
+            complaints.push(format!("{sample}, seed {seed}, mutant {index} ({kind}): {text}"));
+        }
+    }
+    complaints
+}
+
+#[test]
+fn samples_are_accepted() {
+    for sample in ["cantilever.h5", "free_free.h5", "complete.h5"] {
+        let output = check(&data(sample)).unwrap();
+        assert_eq!(output.status.code(), Some(0), "{sample}: {}", String::from_utf8_lossy(&output.stderr));
+    }
+}
+
+#[test]
+fn damaged_contiguous_files_are_refused_or_read_and_never_crash() {
+    let complaints = stress("cantilever.h5", 7);
+    assert!(complaints.is_empty(), "{}", complaints.join("\n"));
+}
+
+#[test]
+fn damaged_chunked_files_are_refused_or_read_and_never_crash() {
+    let complaints = stress("complete.h5", 11);
+    assert!(complaints.is_empty(), "{}", complaints.join("\n"));
+}
