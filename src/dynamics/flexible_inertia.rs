@@ -44,7 +44,7 @@ impl FlexibleInertia {
         let n = integrals.mode_count();
         self.W.copy_from_slice(&integrals.shape_position);
         if order >= InertiaOrder::First {
-            for (w, p) in self.W.chunks_exact_mut(n).zip(integrals.shape_shape.chunks_exact(n * n)) {
+            for (w, p) in self.W.chunks_exact_mut(n.max(1)).zip(integrals.shape_shape.chunks_exact((n * n).max(1))) {
                 add_product(p, eta, w);
             }
         }
@@ -115,7 +115,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 /// `out += P x` for a column-contiguous square plane.
 fn add_product(plane: &[f64], x: &[f64], out: &mut [f64]) {
     let n = out.len();
-    for (column, x) in plane.chunks_exact(n).zip(x) {
+    for (column, x) in plane.chunks_exact(n.max(1)).zip(x) {
         out.iter_mut().zip(column).for_each(|(o, p)| *o += p * x);
     }
 }

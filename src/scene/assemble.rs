@@ -1,0 +1,462 @@
+//! A scene file to a [`Scene`]: the system, its initial state, and what a run of it shall do.
+
+use super::error::{SceneError, Source};
+use super::functions::function;
+use super::locate::{Step, first_not_finite};
+use super::settings;
+use super::spec::{BodySpec, FunctionSpec, HingeSpec, LoadSpec, ModesRule, ModesSpec, MonitorSpec, Numbers, SceneSpec};
+use crate::integrate::simulate::Method;
+use crate::model::build::{
+    BodyDefinition, BodyDefinitionKind, Definition, FlexibleDefinition, Frame, HingeDefinition, LoadDefinition, PointDefinition,
+};
+use crate::model::{InertiaOrder, LoadAxes, State, System, TimeFunction};
+use nalgebra::{Matrix3, Vector3, Vector6};
+use std::path::Path;
+
+/// What the command line changes in a scene.
+#[derive(Debug, Clone, Default)]
+pub struct Overrides {
+    /// Integrator by name.
+    pub integrator: Option<String>,
+    /// Retain the lowest N modes of every flexible body.
+    pub modes: Option<usize>,
+    /// Flexible bodies to make rigid.
+    pub rigid: Vec<String>,
+    /// Simulated time (s).
+    pub duration: Option<f64>,
+}
+
+/// A limit that a run watches. Limits are on magnitudes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Monitor {
+    /// Load at the hinge of a body (N m, N).
+    Hinge { body: usize, moment_limit: Option<f64>, force_limit: Option<f64> },
+    /// von Mises stress of a body (Pa).
+    Body { body: usize, stress_limit: Option<f64> },
+}
+
+/// A scene ready to run.
+#[derive(Debug)]
+pub struct Scene {
+    /// Title, or the file's name.
+    pub name: String,
+    /// Text and path.
+    pub source: Source,
+    /// The system.
+    pub system: System,
+    /// State at time zero.
+    pub state: State,
+    /// Integration method.
+    pub method: Method,
+    /// Simulated time (s), if the scene gives one.
+    pub duration: Option<f64>,
+    /// Output times per second.
+    pub rate_hz: f64,
+    /// Bodies whose hinge loads are output.
+    pub hinges: Vec<usize>,
+    /// Bodies whose stress is evaluated.
+    pub stress: Vec<usize>,
+    /// Whether output times are audited.
+    pub audit: bool,
+    /// Limits.
+    pub monitors: Vec<Monitor>,
+    /// Factor on deformations in the picture.
+    pub deformation_scale: f64,
+    /// Box of each rigid body that has one (m), by body index.
+    pub boxes: Vec<Option<[f64; 3]>>,
+    /// Modal file and modes of each flexible body, by body index.
+    #[cfg(feature = "hdf5")]
+    pub flexible: Vec<(usize, super::modal_files::Selection)>,
+    /// What the scene does not need or was told to leave out.
+    pub left_out: Vec<String>,
+}
+
+/// Reads and assembles the scene at `path`.
+///
+/// # Errors
+/// [`SceneError`] with file, line, column, key, what was found and what to write instead.
+pub fn load(path: &Path, overrides: &Overrides) -> Result<Scene, SceneError> {
+    let text = std::fs::read_to_string(path).map_err(|source| SceneError::Read { path: path.to_owned(), source })?;
+    assemble(Source { path: path.to_owned(), text }, overrides)
+}
+
+/// Assembles a scene from its text; paths are relative to `source.path`.
+///
+/// # Errors
+/// As [`load`].
+pub fn assemble(source: Source, overrides: &Overrides) -> Result<Scene, SceneError> {
+    let spec: SceneSpec = toml::from_str(&source.text)
+        .map_err(|e| SceneError::Syntax { path: source.path.clone(), message: e.to_string().trim_end().to_owned() })?;
+    if let Some(at) = first_not_finite(&source.text) {
+        let message = "the number is not finite; write a finite number".to_owned();
+        return Err(SceneError::Value { path: source.path, at, message });
+    }
+    if !spec.closure.is_empty() {
+        return Err(source.value(
+            &[Step::Key("closure"), Step::Index(0)],
+            "closed chains are not part of this version; remove the [[closure]] or replace it by a stiff spring on a tree hinge",
+        ));
+    }
+    check_overrides(&spec, overrides)?;
+    let mut assembly = Assembly { source: &source, overrides, left_out: Vec::new(), files: Files::default(), chosen: Vec::new() };
+    let definition = assembly.definition(&spec)?;
+    let (system, state) = definition.build().map_err(|e| source.model(&e))?;
+    let Assembly { mut left_out, .. } = assembly;
+
+    if !(spec.output.rate_hz > 0.0) {
+        return Err(source.value(&[Step::Key("output"), Step::Key("rate_hz")], format!("{} must be positive", spec.output.rate_hz)));
+    }
+    let duration = overrides.duration.or(spec.simulation.duration);
+    if let Some(duration) = duration.filter(|d| !(*d > 0.0 && d.is_finite())) {
+        return Err(source.value(&[Step::Key("simulation"), Step::Key("duration")], format!("{duration} s must be positive")));
+    }
+    let method = settings::method(&spec.simulation, overrides.integrator.as_deref(), &system, spec.output.rate_hz, &source)?;
+    let hinges = match &spec.output.hinges {
+        None => system.definition_order.clone(),
+        Some(names) => names_to_indices(names, "hinges", "hinge", |n| system.hinge_index(n), &source)?,
+    };
+    let stress = match &spec.output.stress {
+        None => system.definition_order.iter().copied().filter(|&k| system.bodies[k].mode_count() > 0).collect(),
+        Some(names) => names_to_indices(names, "stress", "body", |n| system.body_index(n), &source)?,
+    };
+    let monitors = spec.monitor.iter().enumerate().map(|(i, m)| monitor(i, m, &system, &source)).collect::<Result<_, _>>()?;
+    let mut boxes = vec![None; system.bodies.len()];
+    for (body, &k) in spec.body.iter().zip(&system.definition_order) {
+        boxes[k] = body.box_size;
+    }
+    describe_left_out(&spec, &system, &hinges, &mut left_out);
+    let name = spec.name.clone().unwrap_or_else(|| source.path.file_stem().map_or_else(|| "scene".into(), |s| s.to_string_lossy().into_owned()));
+    #[cfg(feature = "hdf5")]
+    let flexible = assembly.chosen.into_iter().map(|(definition, selection)| (system.definition_order[definition], selection)).collect();
+    Ok(Scene {
+        name,
+        system,
+        state,
+        method,
+        duration,
+        rate_hz: spec.output.rate_hz,
+        hinges,
+        stress,
+        audit: spec.output.audit,
+        monitors,
+        deformation_scale: spec.viewer.deformation_scale,
+        boxes,
+        #[cfg(feature = "hdf5")]
+        flexible,
+        left_out,
+        source,
+    })
+}
+
+#[cfg(feature = "hdf5")]
+type Files = super::modal_files::ModalFiles;
+#[cfg(not(feature = "hdf5"))]
+type Files = ();
+#[cfg(feature = "hdf5")]
+type Chosen = (usize, super::modal_files::Selection);
+#[cfg(not(feature = "hdf5"))]
+type Chosen = ();
+
+struct Assembly<'a> {
+    source: &'a Source,
+    overrides: &'a Overrides,
+    left_out: Vec<String>,
+    #[cfg_attr(not(feature = "hdf5"), expect(dead_code, reason = "flexible bodies need modal files"))]
+    files: Files,
+    chosen: Vec<Chosen>,
+}
+
+fn check_overrides(spec: &SceneSpec, overrides: &Overrides) -> Result<(), SceneError> {
+    let flexible: Vec<_> = spec.body.iter().filter(|b| b.modal_file.is_some()).map(|b| b.name.as_str()).collect();
+    match overrides.rigid.iter().find(|name| !flexible.contains(&name.as_str())) {
+        None => Ok(()),
+        Some(name) => Err(SceneError::Override {
+            option: "--rigid",
+            message: format!("\"{name}\" is not a flexible body of the scene; flexible bodies: {}", if flexible.is_empty() { "none".into() } else { flexible.join(", ") }),
+        }),
+    }
+}
+
+fn names_to_indices(
+    names: &[String],
+    key: &'static str,
+    what: &str,
+    find: impl Fn(&str) -> Option<usize>,
+    source: &Source,
+) -> Result<Vec<usize>, SceneError> {
+    let steps = |i| [Step::Key("output"), Step::Key(key), Step::Index(i)];
+    let index = |(i, name): (usize, &String)| find(name).ok_or_else(|| source.value(&steps(i), format!("\"{name}\" is not a {what} of the scene")));
+    names.iter().enumerate().map(index).collect()
+}
+
+fn monitor(index: usize, spec: &MonitorSpec, system: &System, source: &Source) -> Result<Monitor, SceneError> {
+    let at = |key| [Step::Key("monitor"), Step::Index(index), Step::Key(key)];
+    for (key, limit) in [("moment_limit", spec.moment_limit), ("force_limit", spec.force_limit), ("stress_limit", spec.stress_limit)] {
+        if let Some(limit) = limit.filter(|l| !(*l > 0.0)) {
+            return Err(source.value(&at(key), format!("{limit} must be positive; it is a limit on a magnitude")));
+        }
+    }
+    match (&spec.hinge, &spec.body) {
+        (Some(name), None) if spec.stress_limit.is_none() => {
+            let body = system.hinge_index(name).ok_or_else(|| source.value(&at("hinge"), format!("\"{name}\" is not a hinge of the scene")))?;
+            Ok(Monitor::Hinge { body, moment_limit: spec.moment_limit, force_limit: spec.force_limit })
+        }
+        (None, Some(name)) if spec.moment_limit.is_none() && spec.force_limit.is_none() => {
+            let body = system.body_index(name).filter(|&k| system.bodies[k].flexible().is_some());
+            let body = body.ok_or_else(|| source.value(&at("body"), format!("\"{name}\" is not a flexible body of the scene")))?;
+            Ok(Monitor::Body { body, stress_limit: spec.stress_limit })
+        }
+        _ => Err(source.value(
+            &[Step::Key("monitor"), Step::Index(index)],
+            "a monitor watches either hinge = NAME with moment_limit, force_limit, or body = NAME with stress_limit",
+        )),
+    }
+}
+
+fn describe_left_out(spec: &SceneSpec, system: &System, hinges: &[usize], left_out: &mut Vec<String>) {
+    if system.modal_count == 0 {
+        left_out.push("modes (no flexible body)".into());
+    }
+    if spec.gravity == [0.0; 3] {
+        left_out.push("gravity".into());
+    }
+    if system.loads.is_empty() {
+        left_out.push("external loads".into());
+    }
+    if hinges.len() < system.bodies.len() {
+        left_out.push(format!("loads at {} of {} hinges", system.bodies.len() - hinges.len(), system.bodies.len()));
+    }
+    if !spec.output.audit {
+        left_out.push("load audit".into());
+    }
+    left_out.push("closures".into());
+}
+
+impl Assembly<'_> {
+    fn definition(&mut self, spec: &SceneSpec) -> Result<Definition, SceneError> {
+        let mut definition = Definition { gravity: Vector3::from(spec.gravity), ..Definition::default() };
+        for (index, body) in spec.body.iter().enumerate() {
+            let kind = self.body(index, body)?;
+            definition.bodies.push(BodyDefinition { name: body.name.clone(), kind });
+        }
+        for (index, hinge) in spec.hinge.iter().enumerate() {
+            definition.hinges.push(self.hinge(index, hinge)?);
+        }
+        for (index, load) in spec.load.iter().enumerate() {
+            definition.loads.push(self.load(index, load, spec, &definition)?);
+        }
+        Ok(definition)
+    }
+
+    fn body(&mut self, index: usize, body: &BodySpec) -> Result<BodyDefinitionKind, SceneError> {
+        let at = |key| [Step::Key("body"), Step::Index(index), Step::Key(key)];
+        let rigid_keys = [("mass", body.mass.is_some()), ("center_of_mass", body.center_of_mass.is_some()), ("inertia", body.inertia.is_some())];
+        let flexible_keys = [
+            ("modes", body.modes.is_some()),
+            ("damping_ratio", body.damping_ratio.is_some()),
+            ("inertia_order", body.inertia_order.is_some()),
+            ("modal_position", !body.modal_position.is_empty()),
+            ("modal_velocity", !body.modal_velocity.is_empty()),
+        ];
+        let (foreign, needed) = if body.modal_file.is_some() { (rigid_keys.as_slice(), "mass") } else { (flexible_keys.as_slice(), "modal_file") };
+        if let Some((key, _)) = foreign.iter().find(|(_, given)| *given) {
+            let message = if needed == "mass" {
+                format!("body \"{}\" has a modal_file, which gives its mass properties; remove {key}", body.name)
+            } else {
+                format!("body \"{}\" has no modal_file; {key} belongs to flexible bodies", body.name)
+            };
+            return Err(self.source.value(&at(key), message));
+        }
+        if let Some(size) = body.box_size.filter(|s| !s.iter().all(|x| *x > 0.0)) {
+            return Err(self.source.value(&at("box"), format!("{size:?} must be three positive lengths")));
+        }
+        match &body.modal_file {
+            Some(file) => self.flexible(index, body, file),
+            None => {
+                let Some(mass) = body.mass else {
+                    let message = format!("body \"{}\" needs mass and inertia (rigid) or modal_file (flexible)", body.name);
+                    return Err(self.source.value(&[Step::Key("body"), Step::Index(index)], message));
+                };
+                let rows = body.inertia.unwrap_or_default();
+                Ok(BodyDefinitionKind::Rigid {
+                    mass,
+                    center_of_mass: Vector3::from(body.center_of_mass.unwrap_or_default()),
+                    inertia: Matrix3::from_fn(|i, j| rows[i][j]),
+                })
+            }
+        }
+    }
+
+    #[cfg(not(feature = "hdf5"))]
+    fn flexible(&mut self, index: usize, body: &BodySpec, file: &Path) -> Result<BodyDefinitionKind, SceneError> {
+        let _ = (&mut self.chosen, body, file, retained as fn(&Self, usize, &BodySpec, &[f64]) -> _);
+        let _ = (inertia_order as fn(&Source, usize, &BodySpec) -> _, FlexibleDefinition::clone);
+        Err(self.source.value(&[Step::Key("body"), Step::Index(index), Step::Key("modal_file")], "this build reads no modal files; build with the feature \"hdf5\""))
+    }
+
+    #[cfg(feature = "hdf5")]
+    fn flexible(&mut self, index: usize, body: &BodySpec, file: &Path) -> Result<BodyDefinitionKind, SceneError> {
+        let steps = [Step::Key("body"), Step::Index(index), Step::Key("modal_file")];
+        let path = self.source.path.parent().unwrap_or(Path::new("")).join(file);
+        let (handle, full, content_sha256) = self.files.open(&path, self.source, &steps)?;
+        let modes = retained(self, index, body, &full.frequency_hz)?;
+        if modes.len() < full.mode_count() {
+            self.left_out.push(format!("{} of {} modes of \"{}\"", full.mode_count() - modes.len(), full.mode_count(), body.name));
+        }
+        if full.geometric_stiffness.is_some() && !self.left_out.iter().any(|l| l.starts_with("geometric stiffness")) {
+            self.left_out.push("geometric stiffness (in the modal files, not used by this version)".into());
+        }
+        let (modal, integrals) = self.files.pack(&path, &full, &modes);
+        let damping_ratio = match &body.damping_ratio {
+            None => modal.damping_ratio.clone(),
+            Some(Numbers::One(z)) => vec![*z; modes.len()],
+            // a list for the scene's own choice of modes still fits when an override retains fewer
+            Some(Numbers::Many(list)) if self.overrides.modes.is_some() || modes.is_empty() => list.iter().copied().take(modes.len()).collect(),
+            Some(Numbers::Many(list)) => list.clone(),
+        };
+        let start = |given: &[f64]| if self.is_overridden(body) { given.iter().copied().take(modes.len()).collect() } else { given.to_vec() };
+        let definition = FlexibleDefinition {
+            damping_ratio,
+            order: inertia_order(self.source, index, body)?,
+            modal_position: start(&body.modal_position),
+            modal_velocity: start(&body.modal_velocity),
+            mode_numbers: modes.iter().map(|m| m + 1).collect(),
+            modal,
+            integrals,
+        };
+        self.chosen.push((index, super::modal_files::Selection { file: handle, modes, content_sha256 }));
+        Ok(BodyDefinitionKind::Flexible(definition))
+    }
+
+    fn is_overridden(&self, body: &BodySpec) -> bool {
+        self.overrides.modes.is_some() || self.overrides.rigid.contains(&body.name)
+    }
+
+    fn hinge(&self, index: usize, hinge: &HingeSpec) -> Result<HingeDefinition, SceneError> {
+        let at = |key| [Step::Key("hinge"), Step::Index(index), Step::Key(key)];
+        let axes = match (&hinge.axis, &hinge.axes) {
+            (Some(_), Some(_)) => return Err(self.source.value(&at("axes"), "give axis (one) or axes (several), not both")),
+            (Some(axis), None) => vec![Vector3::from(*axis)],
+            (None, axes) => axes.iter().flatten().map(|a| Vector3::from(*a)).collect(),
+        };
+        let numbers = |n: &Option<Numbers>| n.as_ref().map(Numbers::list).unwrap_or_default();
+        let of = |spec: &Option<FunctionSpec>, key| spec.as_ref().map(|f| function(f, self.source, &at(key))).transpose();
+        Ok(HingeDefinition {
+            name: hinge.name.clone(),
+            kind: hinge.kind.clone(),
+            axes,
+            pitch: hinge.pitch,
+            parent: hinge.parent.clone(),
+            parent_node: hinge.parent_node.clone(),
+            parent_frame: Frame { position: Vector3::from(hinge.parent_frame.position), quaternion: hinge.parent_frame.quaternion },
+            child: hinge.child.clone(),
+            child_node: hinge.child_node.clone(),
+            child_frame: Frame { position: Vector3::from(hinge.child_frame.position), quaternion: hinge.child_frame.quaternion },
+            position: hinge.position.clone(),
+            velocity: hinge.velocity.clone(),
+            stiffness: numbers(&hinge.stiffness),
+            damping: numbers(&hinge.damping),
+            rest: numbers(&hinge.rest),
+            torque: of(&hinge.torque, "torque")?,
+            motion: of(&hinge.motion, "motion")?,
+        })
+    }
+
+    fn load(&self, index: usize, load: &LoadSpec, spec: &SceneSpec, definition: &Definition) -> Result<LoadDefinition, SceneError> {
+        let at = |key| [Step::Key("load"), Step::Index(index), Step::Key(key)];
+        let whole = [Step::Key("load"), Step::Index(index)];
+        let of = |spec: &Option<FunctionSpec>, key| -> Result<Option<TimeFunction>, SceneError> {
+            spec.as_ref().map(|f| function(f, self.source, &at(key))).transpose()
+        };
+        let axes = match load.axes.as_str() {
+            "world" => LoadAxes::World,
+            "body" => LoadAxes::Body,
+            other => return Err(self.source.value(&at("axes"), format!("\"{other}\" must be \"world\" or \"body\""))),
+        };
+        if load.force.is_none() && load.moment.is_none() {
+            return Err(self.source.value(&whole, "a load needs force, moment or both"));
+        }
+        let number = definition.bodies.iter().position(|b| b.name == load.body);
+        let flexible = number.is_some_and(|n| matches!(definition.bodies[n].kind, BodyDefinitionKind::Flexible(_)));
+        let point = match (&load.node, load.mesh_node, load.point) {
+            (Some(node), None, None) => PointDefinition::Interface(node.clone()),
+            (None, Some(node), None) => self.mesh_node(index, node, number)?,
+            (None, None, Some(point)) => PointDefinition::Point(Vector3::from(point)),
+            (None, None, None) if !flexible => PointDefinition::Point(Vector3::from(number.and_then(|n| spec.body[n].center_of_mass).unwrap_or_default())),
+            _ => return Err(self.source.value(&whole, "say where the load acts by one of node, mesh_node (flexible bodies) or point (rigid bodies)")),
+        };
+        Ok(LoadDefinition { body: load.body.clone(), point, force: of(&load.force, "force")?, moment: of(&load.moment, "moment")?, axes })
+    }
+
+    #[cfg(not(feature = "hdf5"))]
+    fn mesh_node(&self, index: usize, _node: usize, _number: Option<usize>) -> Result<PointDefinition, SceneError> {
+        let unused = PointDefinition::Node { position: Vector3::zeros(), mode_shape: Vec::<Vector6<f64>>::new(), rotations: false };
+        drop(unused);
+        Err(self.source.value(&[Step::Key("load"), Step::Index(index), Step::Key("mesh_node")], "mesh nodes belong to flexible bodies"))
+    }
+
+    #[cfg(feature = "hdf5")]
+    fn mesh_node(&self, index: usize, node: usize, number: Option<usize>) -> Result<PointDefinition, SceneError> {
+        let steps = [Step::Key("load"), Step::Index(index), Step::Key("mesh_node")];
+        let Some((_, selection)) = self.chosen.iter().find(|(n, _)| Some(*n) == number) else {
+            return Err(self.source.value(&steps, "mesh nodes belong to flexible bodies; name a point instead"));
+        };
+        let wrap = |source| SceneError::ModalFile { path: self.source.path.clone(), at: self.source.at(&steps), source };
+        let position = selection.file.node_position(node).map_err(wrap)?;
+        let displacement = selection.file.node_displacement(node).map_err(wrap)?;
+        let rotation = selection.file.node_rotation(node).map_err(wrap)?;
+        let shape = |&mode: &usize| {
+            let turn = rotation.as_ref().map_or_else(Vector3::zeros, |r| r[mode]);
+            let move_ = displacement[mode];
+            Vector6::new(turn.x, turn.y, turn.z, move_.x, move_.y, move_.z)
+        };
+        Ok(PointDefinition::Node { position, mode_shape: selection.modes.iter().map(shape).collect(), rotations: rotation.is_some() })
+    }
+}
+
+/// 0-based numbers of the modes that the scene and the command line retain.
+fn retained(assembly: &Assembly<'_>, index: usize, body: &BodySpec, frequency_hz: &[f64]) -> Result<Vec<usize>, SceneError> {
+    let steps = [Step::Key("body"), Step::Index(index), Step::Key("modes")];
+    let fault = |message: String| Err(assembly.source.value(&steps, message));
+    let available = frequency_hz.len();
+    if assembly.overrides.rigid.contains(&body.name) {
+        return Ok(Vec::new());
+    }
+    if let Some(count) = assembly.overrides.modes {
+        return Ok((0..count.min(available)).collect());
+    }
+    match &body.modes {
+        None => Ok((0..available).collect()),
+        Some(ModesSpec::List(list)) => {
+            let mut seen = vec![false; available];
+            for &mode in list {
+                if mode == 0 || mode > available {
+                    return fault(format!("mode {mode} does not exist; the modal file has modes 1 to {available}"));
+                }
+                if std::mem::replace(&mut seen[mode - 1], true) {
+                    return fault(format!("mode {mode} is listed twice"));
+                }
+            }
+            Ok(list.iter().map(|m| m - 1).collect())
+        }
+        Some(ModesSpec::Rule(ModesRule { count: Some(count), max_frequency_hz: None })) if *count <= available => Ok((0..*count).collect()),
+        Some(ModesSpec::Rule(ModesRule { count: Some(count), max_frequency_hz: None })) => {
+            fault(format!("count = {count}, but the modal file has only {available} modes"))
+        }
+        Some(ModesSpec::Rule(ModesRule { count: None, max_frequency_hz: Some(limit) })) if *limit > 0.0 => {
+            Ok((0..available).filter(|&j| frequency_hz[j] <= *limit).collect())
+        }
+        Some(ModesSpec::Rule(_)) => fault("give { count = N } or { max_frequency_hz = F } with F positive".into()),
+    }
+}
+
+fn inertia_order(source: &Source, index: usize, body: &BodySpec) -> Result<InertiaOrder, SceneError> {
+    match body.inertia_order {
+        Some(0) => Ok(InertiaOrder::Zeroth),
+        Some(1) => Ok(InertiaOrder::First),
+        Some(2) | None => Ok(InertiaOrder::Second),
+        Some(other) => {
+            Err(source.value(&[Step::Key("body"), Step::Index(index), Step::Key("inertia_order")], format!("{other} must be 0, 1 or 2")))
+        }
+    }
+}

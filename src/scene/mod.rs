@@ -1,0 +1,13 @@
+//! Scene files: from TOML to a system, its initial state and the settings of a run.
+
+pub mod assemble;
+pub mod error;
+mod functions;
+mod locate;
+#[cfg(feature = "hdf5")]
+mod modal_files;
+pub mod settings;
+pub mod spec;
+
+pub use assemble::{Monitor, Overrides, Scene};
+pub use error::SceneError;

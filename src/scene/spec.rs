@@ -1,0 +1,363 @@
+//! The scene file as serde reads it: one struct per table, one field per key, nothing interpreted.
+
+use serde::Deserialize;
+use std::path::PathBuf;
+
+/// One number, or one per coordinate.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(untagged, expecting = "a number or a list of numbers")]
+pub enum Numbers {
+    /// The same for all.
+    One(f64),
+    /// One each.
+    Many(Vec<f64>),
+}
+
+impl Numbers {
+    /// As a list.
+    #[must_use]
+    pub fn list(&self) -> Vec<f64> {
+        match self {
+            Self::One(x) => vec![*x],
+            Self::Many(x) => x.clone(),
+        }
+    }
+}
+
+/// Rows of a table function, or the CSV file that holds them (time in the first column).
+#[derive(Debug, Clone, Deserialize)]
+#[serde(untagged, expecting = "rows [[time, value], ...] or the path of a CSV file")]
+pub enum TableSpec {
+    /// `[[t, x], ...]`
+    Rows(Vec<(f64, Numbers)>),
+    /// `"file.csv"`
+    File(PathBuf),
+}
+
+/// `sine = { amplitude, frequency_hz, phase }`
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SineSpec {
+    /// One per component.
+    pub amplitude: Numbers,
+    /// Hz.
+    pub frequency_hz: f64,
+    /// rad.
+    #[serde(default)]
+    pub phase: f64,
+}
+
+/// `smooth_step = { from, to, start, end }`
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SmoothStepSpec {
+    /// Value before.
+    pub from: Numbers,
+    /// Value after.
+    pub to: Numbers,
+    /// s.
+    pub start: f64,
+    /// s.
+    pub end: f64,
+}
+
+/// A time function: exactly one of the keys.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FunctionSpec {
+    /// Same value at all times.
+    pub constant: Option<Numbers>,
+    /// Values at times.
+    pub table: Option<TableSpec>,
+    /// Harmonic.
+    pub sine: Option<SineSpec>,
+    /// Twice differentiable step.
+    pub smooth_step: Option<SmoothStepSpec>,
+    /// Sum of functions.
+    pub sum: Option<Vec<FunctionSpec>>,
+}
+
+/// A frame.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FrameSpec {
+    /// m.
+    #[serde(default)]
+    pub position: [f64; 3],
+    /// `[w, x, y, z]`
+    #[serde(default = "identity")]
+    pub quaternion: [f64; 4],
+}
+
+const fn identity() -> [f64; 4] {
+    [1.0, 0.0, 0.0, 0.0]
+}
+
+impl Default for FrameSpec {
+    fn default() -> Self {
+        Self { position: [0.0; 3], quaternion: identity() }
+    }
+}
+
+/// Which modes of a file to retain.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(untagged, expecting = "a list of 1-based mode numbers, { count = N } or { max_frequency_hz = F }")]
+pub enum ModesSpec {
+    /// 1-based numbers.
+    List(Vec<usize>),
+    /// A rule.
+    Rule(ModesRule),
+}
+
+/// A rule for the retained modes: exactly one of the keys.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ModesRule {
+    /// The lowest N.
+    pub count: Option<usize>,
+    /// All up to this frequency.
+    pub max_frequency_hz: Option<f64>,
+}
+
+/// `[[body]]`
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BodySpec {
+    /// Unique.
+    pub name: String,
+    /// kg.
+    pub mass: Option<f64>,
+    /// m, body axes.
+    pub center_of_mass: Option<[f64; 3]>,
+    /// kg m^2 about the centre of mass, body axes.
+    pub inertia: Option<[[f64; 3]; 3]>,
+    /// Edge lengths of the box that the viewer shows (m); from the inertia if none.
+    #[serde(rename = "box")]
+    pub box_size: Option<[f64; 3]>,
+    /// Modal file, relative to the scene.
+    pub modal_file: Option<PathBuf>,
+    /// Retained modes; all if none.
+    pub modes: Option<ModesSpec>,
+    /// Overrides the file.
+    pub damping_ratio: Option<Numbers>,
+    /// 0, 1 or 2.
+    pub inertia_order: Option<u8>,
+    /// Initial modal coordinates.
+    #[serde(default)]
+    pub modal_position: Vec<f64>,
+    /// Initial modal rates.
+    #[serde(default)]
+    pub modal_velocity: Vec<f64>,
+}
+
+/// `[[hinge]]`
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct HingeSpec {
+    /// Unique.
+    pub name: String,
+    /// Kind.
+    pub kind: String,
+    /// One axis, in O+ axes.
+    pub axis: Option<[f64; 3]>,
+    /// Several axes, in O+ axes.
+    pub axes: Option<Vec<[f64; 3]>>,
+    /// m/rad.
+    pub pitch: Option<f64>,
+    /// Body or "world".
+    pub parent: String,
+    /// Interface of a flexible parent.
+    pub parent_node: Option<String>,
+    /// O+ on the parent.
+    #[serde(default)]
+    pub parent_frame: FrameSpec,
+    /// Body.
+    pub child: String,
+    /// Interface of a flexible child.
+    pub child_node: Option<String>,
+    /// O on the child.
+    #[serde(default)]
+    pub child_frame: FrameSpec,
+    /// Initial coordinates.
+    #[serde(default)]
+    pub position: Vec<f64>,
+    /// Initial rates.
+    #[serde(default)]
+    pub velocity: Vec<f64>,
+    /// Springs.
+    pub stiffness: Option<Numbers>,
+    /// Dampers.
+    pub damping: Option<Numbers>,
+    /// Rest displacements.
+    pub rest: Option<Numbers>,
+    /// Motor.
+    pub torque: Option<FunctionSpec>,
+    /// Prescribed motion.
+    pub motion: Option<FunctionSpec>,
+}
+
+/// `[[load]]`
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LoadSpec {
+    /// Loaded body.
+    pub body: String,
+    /// Interface.
+    pub node: Option<String>,
+    /// 0-based mesh node.
+    pub mesh_node: Option<usize>,
+    /// Point of a rigid body (m).
+    pub point: Option<[f64; 3]>,
+    /// N.
+    pub force: Option<FunctionSpec>,
+    /// N m.
+    pub moment: Option<FunctionSpec>,
+    /// "world" or "body".
+    #[serde(default = "world")]
+    pub axes: String,
+}
+
+fn world() -> String {
+    "world".into()
+}
+
+/// `[[monitor]]`
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MonitorSpec {
+    /// Hinge to watch.
+    pub hinge: Option<String>,
+    /// Body to watch.
+    pub body: Option<String>,
+    /// Largest moment magnitude (N m).
+    pub moment_limit: Option<f64>,
+    /// Largest force magnitude (N).
+    pub force_limit: Option<f64>,
+    /// Largest von Mises stress (Pa).
+    pub stress_limit: Option<f64>,
+}
+
+/// `[simulation]`
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SimulationSpec {
+    /// s.
+    pub duration: Option<f64>,
+    /// Name of the integrator.
+    pub integrator: Option<String>,
+    /// Of the local error.
+    #[serde(default = "relative_tolerance")]
+    pub relative_tolerance: f64,
+    /// Of the local error, in the coordinates' units.
+    #[serde(default = "absolute_tolerance")]
+    pub absolute_tolerance: f64,
+    /// Fixed step (s).
+    pub step: Option<f64>,
+    /// Largest step of an error-controlled integrator (s).
+    pub largest_step: Option<f64>,
+}
+
+const fn relative_tolerance() -> f64 {
+    1e-6
+}
+
+const fn absolute_tolerance() -> f64 {
+    1e-9
+}
+
+impl Default for SimulationSpec {
+    fn default() -> Self {
+        Self {
+            duration: None,
+            integrator: None,
+            relative_tolerance: relative_tolerance(),
+            absolute_tolerance: absolute_tolerance(),
+            step: None,
+            largest_step: None,
+        }
+    }
+}
+
+/// `[output]`
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct OutputSpec {
+    /// Output times per second.
+    #[serde(default = "rate_hz")]
+    pub rate_hz: f64,
+    /// Hinges whose loads are output; all if none.
+    pub hinges: Option<Vec<String>>,
+    /// Bodies whose stress is evaluated; all that have stress modes if none.
+    pub stress: Option<Vec<String>>,
+    /// Whether every output time is audited by the Newton-Euler sweep.
+    #[serde(default = "yes")]
+    pub audit: bool,
+}
+
+const fn rate_hz() -> f64 {
+    60.0
+}
+
+const fn yes() -> bool {
+    true
+}
+
+impl Default for OutputSpec {
+    fn default() -> Self {
+        Self { rate_hz: rate_hz(), hinges: None, stress: None, audit: true }
+    }
+}
+
+/// `[viewer]`
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ViewerSpec {
+    /// Factor on deformations in the picture.
+    #[serde(default = "one")]
+    pub deformation_scale: f64,
+}
+
+const fn one() -> f64 {
+    1.0
+}
+
+impl Default for ViewerSpec {
+    fn default() -> Self {
+        Self { deformation_scale: one() }
+    }
+}
+
+/// The whole file.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SceneSpec {
+    /// Title.
+    pub name: Option<String>,
+    /// m/s^2.
+    #[serde(default)]
+    pub gravity: [f64; 3],
+    /// Bodies.
+    #[serde(default)]
+    pub body: Vec<BodySpec>,
+    /// Hinges.
+    #[serde(default)]
+    pub hinge: Vec<HingeSpec>,
+    /// Loops; recognised so that they can be refused by name.
+    #[serde(default)]
+    pub closure: Vec<toml::Table>,
+    /// External loads.
+    #[serde(default)]
+    pub load: Vec<LoadSpec>,
+    /// Limits.
+    #[serde(default)]
+    pub monitor: Vec<MonitorSpec>,
+    /// Time.
+    #[serde(default)]
+    pub simulation: SimulationSpec,
+    /// What is written.
+    #[serde(default)]
+    pub output: OutputSpec,
+    /// What is shown.
+    #[serde(default)]
+    pub viewer: ViewerSpec,
+}
