@@ -106,6 +106,8 @@ refused! {
         let deep = (0..500).fold(TypeDescriptor::Integer(IntSize::U4), |inner, _| TypeDescriptor::VarLenArray(Box::new(inner)));
         f.new_dataset_builder().empty_as(&deep).shape(1).create("extra").unwrap();
     }, ["extra", "variable-length or odd", "plain little-endian"];
+    control_characters_are_refused: CANTILEVER, |f| text(f, "title", "boom\u{1b}[2J"), ["@title", "control characters", "printable"];
+    a_name_with_control_characters_is_refused: CANTILEVER, |f| f.relink("interfaces/mid", "interfaces/m\u{7}").unwrap(), ["interfaces", "\"m\\u{7}\"", "rename"];
     another_shape_is_refused: CANTILEVER, |f| replace(f, "body/center_of_mass", &[4], &[0.0; 4]), ["body/center_of_mass", "shape (4)", "(3)"];
     a_node_count_that_disagrees_is_refused: CANTILEVER, |f| f.attr("node_count").unwrap().write_scalar(&27_i64).unwrap(), ["(26, 3)", "(27, 3)", "node_count"];
     a_huge_declared_size_is_refused: CANTILEVER, |f| {

@@ -92,6 +92,11 @@ impl GuardedFile {
                 if path == "VTKHDF" {
                     continue;
                 }
+                if name.contains(char::is_control) {
+                    let (file, object, found) = (self.path.clone(), shown.to_owned(), format!("an object named {name:?}"));
+                    let remedy = "rename the object";
+                    return Err(ModalFileError::WrongValue { file, object, found, expected: "printable names".to_owned(), remedy });
+                }
                 let elsewhere = |found| ModalFileError::Elsewhere { file: self.path.clone(), object: path.clone(), found };
                 match link {
                     LinkType::Hard => {}
@@ -242,7 +247,12 @@ impl GuardedFile {
         };
         let bytes = read.map_err(|e| self.unreadable(&shown, &e))?.unwrap_or_default();
         let text = String::from_utf8(bytes).map_err(|_| self.wrong_type(&shown, "bytes that are not UTF-8", "a UTF-8 text"))?;
-        Ok(text.trim_end_matches(['\0', ' ']).to_owned())
+        let text = text.trim_end_matches(['\0', ' ']);
+        // texts reach the terminal, where control characters are commands
+        if text.contains(char::is_control) {
+            return Err(self.wrong_type(&shown, "a text with control characters", "a printable text"));
+        }
+        Ok(text.to_owned())
     }
 
     /// An attribute that counts something.
