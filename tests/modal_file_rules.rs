@@ -3,7 +3,7 @@
 //! Each test copies a sample, breaks one thing, writes the digest again so that it does not hide the rest, and reads the messages.
 #![cfg(feature = "hdf5")]
 
-use hdf5::types::{FixedAscii, VarLenUnicode};
+use hdf5::types::{FixedAscii, IntSize, TypeDescriptor, VarLenUnicode};
 use hdf5::{File, Location};
 use pliant::io::{ModalFile, examine};
 use std::path::{Path, PathBuf};
@@ -94,7 +94,7 @@ refused! {
     a_missing_mode_is_refused: CANTILEVER, |f| f.unlink("modes/displacement/0001").unwrap(), ["modes/displacement", "2 datasets", "one dataset per mode"];
     single_precision_integrals_are_refused: CANTILEVER, |f| replace(f, "inertia/momentum", &[3, 3], &[0.0_f32; 9]), ["inertia/momentum", "<f4", "<f8"];
     narrow_integers_are_refused: CANTILEVER, |f| replace(f, "interfaces/tip/nodes", &[1], &[1_i32]), ["interfaces/tip/nodes", "found i4", "i8"];
-    booleans_are_refused: CANTILEVER, |f| replace(f, "modes/kind", &[3], &[false; 3]), ["modes/kind", "enumeration", "plain little-endian"];
+    booleans_are_refused: CANTILEVER, |f| replace(f, "modes/kind", &[3], &[false; 3]), ["modes/kind", "a boolean", "plain little-endian"];
     variable_length_texts_are_refused: CANTILEVER, |f| {
         f.delete_attr("title").unwrap();
         f.new_attr::<VarLenUnicode>().create("title").unwrap().write_scalar(&"boom".parse::<VarLenUnicode>().unwrap()).unwrap();
@@ -102,6 +102,12 @@ refused! {
     a_variable_length_dataset_is_refused: CANTILEVER, |f| {
         f.new_dataset::<VarLenUnicode>().shape(2).create("notes").unwrap();
     }, ["notes", "a variable-length text", "little-endian f8"];
+    a_type_nested_without_end_is_refused: CANTILEVER, |f| {
+        let deep = (0..500).fold(TypeDescriptor::Integer(IntSize::U4), |inner, _| TypeDescriptor::VarLenArray(Box::new(inner)));
+        f.new_dataset_builder().empty_as(&deep).shape(1).create("extra").unwrap();
+    }, ["extra", "variable-length or odd", "plain little-endian"];
+    control_characters_are_refused: CANTILEVER, |f| text(f, "title", "boom\u{1b}[2J"), ["@title", "control characters", "printable"];
+    a_name_with_control_characters_is_refused: CANTILEVER, |f| f.relink("interfaces/mid", "interfaces/m\u{7}").unwrap(), ["interfaces", "\"m\\u{7}\"", "rename"];
     another_shape_is_refused: CANTILEVER, |f| replace(f, "body/center_of_mass", &[4], &[0.0; 4]), ["body/center_of_mass", "shape (4)", "(3)"];
     a_node_count_that_disagrees_is_refused: CANTILEVER, |f| f.attr("node_count").unwrap().write_scalar(&27_i64).unwrap(), ["(26, 3)", "(27, 3)", "node_count"];
     a_huge_declared_size_is_refused: CANTILEVER, |f| {

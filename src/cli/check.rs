@@ -74,7 +74,7 @@ pub mod health {
         for row in report.rows.iter().filter(|row| row.verdict != Verdict::NotReached) {
             table.row([
                 row.rule.name().to_owned(),
-                row.figure.map_or("-".to_owned(), |figure| format!("{figure:.2e}")),
+                row.figure.map_or("-".to_owned(), figure),
                 row.bound.map_or(String::new(), |bound| format!("{} {}", bound.relation(), limit(bound.limit()))),
                 row.verdict.word().to_owned(),
                 row.rule.protects().to_owned(),
@@ -82,6 +82,11 @@ pub mod health {
             ]);
         }
         table
+    }
+
+    /// Three digits of a figure.
+    fn figure(value: f64) -> String {
+        if value == 0.0 { "0".to_owned() } else { format!("{value:.2e}") }
     }
 
     /// A limit in the form of the schema.

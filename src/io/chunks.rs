@@ -8,13 +8,17 @@ use hdf5::filters::Filter;
 /// Bytes of a fletcher32 checksum.
 const CHECKSUM_BYTES: u64 = 4;
 
+/// More than deflate and a checksum add to a chunk that does not compress, beside a sixteenth of its size. A chunk stored in more
+/// bytes than that would unpack to something else, and libhdf5 unpacks first and looks afterwards.
+const SLACK_BYTES: u64 = 1024;
+
 /// What the index promises and what it holds, in words, if they differ.
 pub(super) struct ChunkFault {
     pub found: String,
     pub expected: String,
 }
 
-/// Every chunk of the grid is there once, inside the file, and no smaller than its checksum.
+/// Every chunk of the grid is there once, inside the file, no smaller than its checksum and no larger than raw data.
 ///
 /// `chunk` has the rank of `shape` and no zero extent; `element_bytes` is the size of one element, `file_bytes` that of the file.
 pub(super) fn check_chunks(
@@ -44,6 +48,8 @@ pub(super) fn check_chunks(
             Some(("a chunk beyond the end of the file".to_owned(), format!("chunks within {file_bytes} bytes")))
         } else if plain && info.size != raw_bytes {
             Some((format!("a chunk of {} bytes", info.size), format!("chunks of {raw_bytes} bytes")))
+        } else if info.size > raw_bytes + raw_bytes / 16 + SLACK_BYTES {
+            Some((format!("a chunk of {} bytes", info.size), format!("chunks of at most {raw_bytes} bytes and some overhead")))
         } else if guarded && info.size <= CHECKSUM_BYTES || info.size == 0 {
             Some((format!("a chunk of {} bytes", info.size), "chunks longer than their checksum".to_owned()))
         } else {

@@ -122,7 +122,7 @@ pub enum ModalFileError {
         expected: String,
     },
     /// libhdf5 cannot read an object that is declared properly.
-    #[error("{}: {object}: found unreadable data ({cause}), expected data that passes its checksum; the file is damaged: copy or write it again", file.display())]
+    #[error("{}: {object}: found unreadable data ({cause}), expected whole data whose checksums agree; the file is damaged: copy or write it again", file.display())]
     Unreadable {
         /// The file.
         file: PathBuf,
@@ -198,6 +198,7 @@ impl ModalFileError {
             Self::Unreadable { .. } => Rule::Checksums,
             Self::RuleBroken { rule, .. } => *rule,
             Self::WrongValue { object, .. } if object.ends_with("@format") || object.ends_with("@version") => Rule::Format,
+            Self::WrongValue { object, .. } if object == "inertia/modal_mass" => Rule::Orthonormality,
             _ => Rule::Structure,
         }
     }

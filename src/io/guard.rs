@@ -7,8 +7,8 @@ use super::array::{ElementType, GuardedDataset};
 use super::chunks::check_chunks;
 use super::error::ModalFileError;
 use hdf5::filters::Filter;
-use hdf5::types::{FixedAscii, FixedUnicode, FloatSize, IntSize, TypeDescriptor};
-use hdf5::{IndexType, IterationOrder, LinkType, LocationType};
+use hdf5::types::{FixedAscii, FixedUnicode, VarLenAscii, VarLenUnicode};
+use hdf5::{Datatype, IndexType, IterationOrder, LinkType, LocationType};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -91,6 +91,11 @@ impl GuardedFile {
                 let path = format!("{prefix}{name}");
                 if path == "VTKHDF" {
                     continue;
+                }
+                if name.contains(char::is_control) {
+                    let (file, object, found) = (self.path.clone(), shown.to_owned(), format!("an object named {name:?}"));
+                    let remedy = "rename the object";
+                    return Err(ModalFileError::WrongValue { file, object, found, expected: "printable names".to_owned(), remedy });
                 }
                 let elsewhere = |found| ModalFileError::Elsewhere { file: self.path.clone(), object: path.clone(), found };
                 match link {
@@ -232,27 +237,29 @@ impl GuardedFile {
     pub fn text(&self, object: &str, name: &str) -> Result<String, ModalFileError> {
         let (shown, attribute) = self.attribute(object, name, "a fixed-length text")?;
         let datatype = attribute.dtype().map_err(|e| self.unreadable(&shown, &e))?;
-        let descriptor = datatype.to_descriptor().map_err(|e| self.unreadable(&shown, &e))?;
-        let read = match descriptor {
-            TypeDescriptor::FixedAscii(size) if size <= TEXT_LIMIT => {
-                attribute.read_raw::<FixedAscii<TEXT_LIMIT>>().map(|v| v.first().map(|t| t.as_bytes().to_vec()))
-            }
-            TypeDescriptor::FixedUnicode(size) if size <= TEXT_LIMIT => {
-                attribute.read_raw::<FixedUnicode<TEXT_LIMIT>>().map(|v| v.first().map(|t| t.as_bytes().to_vec()))
-            }
-            _ => return Err(self.wrong_type(&shown, &describe(&datatype), "a fixed-length text of at most 4096 bytes")),
+        let fits = datatype.size() <= TEXT_LIMIT;
+        let read = if fits && is_ascii(&datatype) {
+            attribute.read_raw::<FixedAscii<TEXT_LIMIT>>().map(|v| v.first().map(|t| t.as_bytes().to_vec()))
+        } else if fits && is_unicode(&datatype) {
+            attribute.read_raw::<FixedUnicode<TEXT_LIMIT>>().map(|v| v.first().map(|t| t.as_bytes().to_vec()))
+        } else {
+            return Err(self.wrong_type(&shown, &describe(&datatype), "a fixed-length text of at most 4096 bytes"));
         };
         let bytes = read.map_err(|e| self.unreadable(&shown, &e))?.unwrap_or_default();
         let text = String::from_utf8(bytes).map_err(|_| self.wrong_type(&shown, "bytes that are not UTF-8", "a UTF-8 text"))?;
-        Ok(text.trim_end_matches(['\0', ' ']).to_owned())
+        let text = text.trim_end_matches(['\0', ' ']);
+        // texts reach the terminal, where control characters are commands
+        if text.contains(char::is_control) {
+            return Err(self.wrong_type(&shown, "a text with control characters", "a printable text"));
+        }
+        Ok(text.to_owned())
     }
 
     /// An attribute that counts something.
     pub fn count(&self, object: &str, name: &str) -> Result<usize, ModalFileError> {
         let (shown, attribute) = self.attribute(object, name, "an integer")?;
         let datatype = attribute.dtype().map_err(|e| self.unreadable(&shown, &e))?;
-        let descriptor = datatype.to_descriptor().map_err(|e| self.unreadable(&shown, &e))?;
-        if !matches!(descriptor, TypeDescriptor::Integer(_) | TypeDescriptor::Unsigned(_)) {
+        if integer_name(&datatype).is_none() {
             return Err(self.wrong_type(&shown, &describe(&datatype), "an integer"));
         }
         let value = attribute.read_raw::<i64>().map_err(|e| self.unreadable(&shown, &e))?.first().copied().unwrap_or(-1);
@@ -322,22 +329,43 @@ pub(super) fn cause(error: &hdf5::Error) -> String {
     error.to_string().lines().next().unwrap_or("no reason given").to_owned()
 }
 
+/// Fixed-length text in ASCII; decided by the conversions of libhdf5, which exist between such texts only.
+fn is_ascii(datatype: &Datatype) -> bool {
+    datatype.conv_to::<FixedAscii<TEXT_LIMIT>>().is_some()
+}
+
+/// Fixed-length text in UTF-8.
+fn is_unicode(datatype: &Datatype) -> bool {
+    datatype.conv_to::<FixedUnicode<TEXT_LIMIT>>().is_some()
+}
+
+/// The name of an integer type, if it is one.
+fn integer_name(datatype: &Datatype) -> Option<&'static str> {
+    let signed = [("i1", datatype.is::<i8>()), ("i2", datatype.is::<i16>()), ("i4", datatype.is::<i32>()), ("i8", datatype.is::<i64>())];
+    let unsigned = [("u1", datatype.is::<u8>()), ("u2", datatype.is::<u16>()), ("u4", datatype.is::<u32>()), ("u8", datatype.is::<u64>())];
+    signed.into_iter().chain(unsigned).find(|&(_, found)| found).map(|(name, _)| name)
+}
+
 /// An element type in words.
-fn describe(datatype: &hdf5::Datatype) -> String {
-    let order = if datatype.byte_order() == hdf5::datatype::ByteOrder::BigEndian { "big-endian " } else { "" };
-    let bytes = |size: IntSize| size as usize;
-    match datatype.to_descriptor() {
-        Ok(TypeDescriptor::Integer(size)) => format!("{order}i{}", bytes(size)),
-        Ok(TypeDescriptor::Unsigned(size)) => format!("{order}u{}", bytes(size)),
-        Ok(TypeDescriptor::Float(FloatSize::U4)) => format!("{order}f4, not in IEEE form"),
-        Ok(TypeDescriptor::Float(FloatSize::U8)) => format!("{order}f8, not in IEEE form"),
-        Ok(TypeDescriptor::Boolean | TypeDescriptor::Enum(_)) => "an enumeration (bool or enum)".to_owned(),
-        Ok(TypeDescriptor::Compound(_)) => "a compound type".to_owned(),
-        Ok(TypeDescriptor::FixedArray(..)) => "an array type".to_owned(),
-        Ok(TypeDescriptor::FixedAscii(size) | TypeDescriptor::FixedUnicode(size)) => format!("a text of {size} bytes"),
-        Ok(TypeDescriptor::VarLenArray(_)) => "a variable-length array".to_owned(),
-        Ok(TypeDescriptor::VarLenAscii | TypeDescriptor::VarLenUnicode) => "a variable-length text".to_owned(),
-        Ok(TypeDescriptor::Reference(_)) => "an object reference".to_owned(),
-        Err(_) => format!("an unknown type of {} bytes", datatype.size()),
+///
+/// By comparison with known types: the wrapper's own descriptor copies a nested type once per level, which takes gigabytes for
+/// the thousands of levels that fit into one header message.
+fn describe(datatype: &Datatype) -> String {
+    if let Some(name) = integer_name(datatype) {
+        name.to_owned()
+    } else if datatype.is::<f32>() {
+        "f4".to_owned()
+    } else if datatype.is::<f64>() {
+        "f8".to_owned()
+    } else if datatype.is::<VarLenAscii>() || datatype.is::<VarLenUnicode>() {
+        "a variable-length text".to_owned()
+    } else if is_ascii(datatype) || is_unicode(datatype) {
+        format!("a text of {} bytes", datatype.size())
+    } else if datatype.is::<bool>() {
+        "a boolean (an enumeration)".to_owned()
+    } else if datatype.byte_order() == hdf5::datatype::ByteOrder::BigEndian {
+        format!("a big-endian type of {} bytes", datatype.size())
+    } else {
+        format!("a compound, enumerated, array, reference, variable-length or odd number type of {} bytes", datatype.size())
     }
 }

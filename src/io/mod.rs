@@ -8,7 +8,8 @@
 //! # Bounds on a damaged file
 //! No dataset above 2 GiB is read, none that declares more than deflate could unpack from the file's own length, and none whose
 //! storage is incomplete or lies outside the file. At any time the reader holds at most one dataset of up to 2 GiB and 256 MiB of mode
-//! shapes besides the modal integrals, and libhdf5 one chunk of up to 256 MiB. The content pass reads at most 16 GiB in
+//! shapes besides the modal integrals, and libhdf5 one chunk of up to 256 MiB. A chunk made to unpack to more than it declares is refused
+//! only after libhdf5 has unpacked it, so a hostile file of F bytes can cost up to 1032 F for that moment. The content pass reads at most 16 GiB in
 //! all. libhdf5 is C code that has looped on damaged variable-length data, so those types are refused by their descriptor before any read.
 
 mod array;
