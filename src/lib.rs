@@ -5,5 +5,6 @@ pub mod integrate;
 #[cfg(feature = "hdf5")]
 pub mod io;
 pub mod model;
+pub mod output;
 pub mod scene;
 pub mod spatial;

@@ -16,6 +16,8 @@ pub struct Arguments {
 /// The subcommands.
 #[derive(Debug, Subcommand)]
 pub enum Command {
+    /// Evaluate a scene once, at its initial state: accelerations, hinge loads, energies
+    Eval(EvalArguments),
     /// Check scenes and modal files; a modal file gets its health report, one row per rule
     Check(CheckArguments),
     /// Show the modes of a modal file: frequencies, effective masses, participation, interfaces, rules
@@ -42,6 +44,39 @@ pub struct ModesArguments {
     #[arg(value_name = "FILE")]
     pub file: PathBuf,
     /// Print one JSON object instead of tables
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// What a command changes in a scene, so that one scene serves a comparison.
+#[derive(Debug, Args)]
+#[command(help_expected = true)]
+pub struct SceneArguments {
+    /// Integrate with this method instead of the scene's: auto, dormand_prince or rk4
+    #[arg(long, value_name = "NAME")]
+    pub integrator: Option<String>,
+    /// Retain the lowest N modes of every flexible body
+    #[arg(long, value_name = "N")]
+    pub modes: Option<usize>,
+    /// Make this flexible body rigid (may be given several times)
+    #[arg(long, value_name = "BODY")]
+    pub rigid: Vec<String>,
+}
+
+/// Arguments of `pliant eval`.
+#[derive(Debug, Args)]
+#[command(help_expected = true)]
+pub struct EvalArguments {
+    /// The scene (.toml)
+    #[arg(value_name = "SCENE")]
+    pub scene: PathBuf,
+    /// Time at which loads and prescribed motions are taken (s)
+    #[arg(long, value_name = "T", default_value_t = 0.0, allow_negative_numbers = true)]
+    pub time: f64,
+    /// Changes to the scene
+    #[command(flatten)]
+    pub overrides: SceneArguments,
+    /// Print one JSON object instead of tables; every number reads back to the same f64
     #[arg(long)]
     pub json: bool,
 }

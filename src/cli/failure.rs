@@ -50,7 +50,6 @@ impl From<io::Error> for Failure {
 }
 
 /// An error and its causes in one text.
-#[cfg(feature = "hdf5")]
 pub fn with_causes(error: &dyn std::error::Error) -> String {
     use std::fmt::Write as _;
     let mut text = error.to_string();
@@ -60,6 +59,18 @@ pub fn with_causes(error: &dyn std::error::Error) -> String {
         cause = inner.source();
     }
     text
+}
+
+impl From<crate::scene::SceneError> for Failure {
+    fn from(error: crate::scene::SceneError) -> Self {
+        Self::input(with_causes(&error))
+    }
+}
+
+impl From<crate::dynamics::DynamicsError> for Failure {
+    fn from(error: crate::dynamics::DynamicsError) -> Self {
+        Self::input(with_causes(&error))
+    }
 }
 
 #[cfg(feature = "hdf5")]

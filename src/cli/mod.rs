@@ -6,10 +6,10 @@
 
 pub mod args;
 mod check;
+mod eval;
 mod failure;
 #[cfg(feature = "hdf5")]
 mod modes;
-#[cfg(feature = "hdf5")]
 mod report;
 
 use args::{Arguments, Command};
@@ -44,6 +44,7 @@ pub fn main() -> ExitCode {
 fn run(arguments: Arguments, output: &mut dyn Write) -> Result<(), Failure> {
     match arguments.command {
         None => Ok(write!(output, "{}", Arguments::command().render_help())?),
+        Some(Command::Eval(arguments)) => eval::run(&arguments, output),
         Some(Command::Check(arguments)) => check::run(&arguments, output),
         #[cfg(feature = "hdf5")]
         Some(Command::Modes(arguments)) => modes::run(&arguments, output),
