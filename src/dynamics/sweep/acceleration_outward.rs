@@ -71,17 +71,23 @@ pub fn acceleration_outward(
             }
         }
         if let Some(index) = own.flexible {
-            let part = &pose.flexible[index];
-            let alpha_b = motion_to(&-part.inboard.position, &rotate(&part.inboard.rotation, &alpha));
-            let range = body.modal_range();
-            alpha = alpha_b + velocity.bodies[k].a_inboard;
-            for (j, m) in range.enumerate() {
-                let acceleration = force.nu_modal[m] - inertia.flexible[index].gain_modal[j].dot(&alpha_b);
-                out.modal[m] = acceleration;
-                if let Some(s) = part.shape_inboard.get(j) {
-                    alpha -= s * acceleration;
+            let (part, elimination) = (&pose.flexible[index], &inertia.flexible[index]);
+            let alpha_o = rotate(&part.inboard.rotation, &alpha);
+            let (range, free) = (body.modal_range(), &force.bodies[k]);
+            let modal = &mut out.modal[range.clone()];
+            modal.copy_from_slice(&force.nu_modal[range]);
+            alpha = match &elimination.root {
+                None => {
+                    let alpha_b = motion_to(&-part.inboard.position, &alpha_o);
+                    modal.iter_mut().zip(&elimination.gain_modal).for_each(|(m, e)| *m -= e.dot(&alpha_b));
+                    alpha_b + velocity.bodies[k].a_inboard
                 }
-            }
+                Some(root) => {
+                    let f = root.P * (alpha_o - free.alpha_inboard);
+                    modal.iter_mut().zip(&root.modal_per_force).for_each(|(m, e)| *m += e.dot(&f));
+                    free.alpha_free + root.frame_per_force * f
+                }
+            };
         }
         out.alpha[k] = alpha;
     }

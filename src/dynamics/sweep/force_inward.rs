@@ -22,6 +22,10 @@ pub struct BodyForce {
     pub z_plus: Vector6<f64>,
     /// `D^-1 epsilon` of the hinge.
     pub nu: [f64; MAX_RATES],
+    /// Acceleration of B without a force at O; only for bodies whose modes move O.
+    pub alpha_free: Vector6<f64>,
+    /// Acceleration of O without a force there, bias included, in B axes; only for bodies whose modes move O.
+    pub alpha_inboard: Vector6<f64>,
 }
 
 /// What the force sweep writes.
@@ -48,7 +52,16 @@ impl ForceScratch {
     pub fn new(system: &System) -> Self {
         let loaded = !system.loads.is_empty();
         Self {
-            bodies: vec![BodyForce { z: Vector6::zeros(), z_plus: Vector6::zeros(), nu: [0.0; MAX_RATES] }; system.bodies.len()],
+            bodies: vec![
+                BodyForce {
+                    z: Vector6::zeros(),
+                    z_plus: Vector6::zeros(),
+                    nu: [0.0; MAX_RATES],
+                    alpha_free: Vector6::zeros(),
+                    alpha_inboard: Vector6::zeros(),
+                };
+                system.bodies.len()
+            ],
             external: vec![Vector6::zeros(); if loaded { system.bodies.len() } else { 0 }],
             external_modal: vec![0.0; if loaded { system.modal_count } else { 0 }],
             nu_modal: vec![0.0; system.modal_count],
@@ -79,8 +92,7 @@ pub fn force_inward(
             None => out.bodies[k].z,
             Some(index) => {
                 let z = filter_modes(system, state, pose, velocity, inertia, k, index, out);
-                let inboard = &pose.flexible[index].inboard;
-                rotate_back(&inboard.rotation, &force_from(&-inboard.position, &z))
+                rotate_back(&pose.flexible[index].inboard.rotation, &z)
             }
         };
         let z_hinge = z_hinge + inertia.bodies[k].P_hinge.times(&own.a);
@@ -103,7 +115,7 @@ pub fn gather_applied(system: &System, state: &State, pose: &PoseScratch, out: &
     }
 }
 
-/// Modes of flexible body `k` (Eq. 34); returns `z_cr+` at B.
+/// Modes of flexible body `k` (Eq. 34); returns `z(k')` at O in B axes, less the bias of the hinge.
 #[expect(clippy::too_many_arguments, reason = "a sweep step reads every earlier sweep")]
 fn filter_modes(
     system: &System,
@@ -117,31 +129,47 @@ fn filter_modes(
 ) -> Vector6<f64> {
     let body = &system.bodies[k];
     let (range, part, elimination) = (body.modal_range(), &pose.flexible[index], &inertia.flexible[index]);
-    let a = velocity.bodies[k].a_inboard;
-    let epsilon = &mut out.nu_modal[range.clone()];
+    let nu = &mut out.nu_modal[range.clone()];
 
-    // epsilon = -z_m + Pi_B' z_cr, gathered in place
+    // epsilon = -z_m, gathered in place
     if let Some(flexible) = body.flexible() {
-        flexible.elastic_force(&state.modal_position[range.clone()], &state.modal_velocity[range.clone()], epsilon);
+        flexible.elastic_force(&state.modal_position[range.clone()], &state.modal_velocity[range.clone()], nu);
     }
-    let b_modal = &velocity.b_modal[range.clone()];
-    for (j, e) in epsilon.iter_mut().enumerate() {
-        *e = -(*e + b_modal[j] + part.inertia.row[j].dot(&a));
+    for (nu, b) in nu.iter_mut().zip(&velocity.b_modal[range.clone()]) {
+        *nu = -(*nu + b);
     }
-    if let Some(external) = out.external_modal.get(range) {
-        epsilon.iter_mut().zip(external).for_each(|(e, x)| *e += x);
+    if let Some(external) = out.external_modal.get(range.clone()) {
+        nu.iter_mut().zip(external).for_each(|(e, x)| *e += x);
     }
     for &child in &elimination.moved_children {
         let child_pose = &pose.bodies[child];
         let Some(start) = child_pose.shape else { continue };
-        let felt = rotate(&child_pose.rotation, &out.bodies[child].z_plus) + inertia.bodies[child].S.times(&motion_to(&child_pose.l, &a));
-        epsilon.iter_mut().zip(&pose.shape[start..]).for_each(|(e, s)| *e -= s.dot(&felt));
+        let felt = rotate(&child_pose.rotation, &out.bodies[child].z_plus);
+        nu.iter_mut().zip(&pose.shape[start..]).for_each(|(e, s)| *e -= s.dot(&felt));
     }
-    // P_rr already holds the children, z their forces
-    let z = out.bodies[k].z + inertia.bodies[k].P.times(&a);
-    epsilon.iter_mut().zip(&part.shape_inboard).for_each(|(e, s)| *e += s.dot(&z));
-    elimination.modal_block.solve(epsilon);
-    z + elimination.mu.iter().zip(epsilon.iter()).map(|(mu, nu)| mu * *nu).sum::<Vector6<f64>>()
+    let Some(root) = &elimination.root else {
+        // a held root: B moves with O, and its bias enters through P_fr and P_rr, which hold the children
+        let a = velocity.bodies[k].a_inboard;
+        nu.iter_mut().zip(&elimination.mu).for_each(|(e, mu)| *e -= mu.dot(&a));
+        elimination.modal_block.solve(nu);
+        let z = out.bodies[k].z + inertia.bodies[k].P.times(&a) + weighted_sum(&elimination.mu, nu);
+        return force_from(&-part.inboard.position, &z);
+    };
+    // a root that modes move: accelerations with no force at O, then the force that moves O as it must
+    elimination.modal_block.solve(nu);
+    let alpha_free = -(root.frame_inverse * (out.bodies[k].z + weighted_sum(&elimination.mu, nu)));
+    for (nu, e) in nu.iter_mut().zip(&elimination.gain_modal) {
+        *nu -= e.dot(&alpha_free);
+    }
+    let free = motion_to(&part.inboard.position, &alpha_free) + weighted_sum(&root.shape, nu);
+    out.bodies[k].alpha_free = alpha_free;
+    out.bodies[k].alpha_inboard = free + velocity.bodies[k].a_inboard;
+    -(root.P * out.bodies[k].alpha_inboard)
+}
+
+/// `sum_j x_j rows_j`.
+fn weighted_sum(rows: &[Vector6<f64>], x: &[f64]) -> Vector6<f64> {
+    rows.iter().zip(x).map(|(r, x)| r * *x).sum()
 }
 
 /// Hinge of body `k` (Eq. 35).

@@ -1,17 +1,21 @@
 //! Inertia sweep: articulated inertias `P`, `P+` and gains, from the tips to the base.
 //!
 //! Reads: [`PoseScratch`]. Writes: [`InertiaScratch`]. Source: Paper Eq. 32 (with the whole `M_fl`) and 33.
+//!
+//! Where modes move the inboard hinge, Eq. 32 as printed subtracts large terms from each other. The same `P_cr+` is found here without
+//! cancellation: with B held as for any body, `P_B+ = P_rr - mu D^-1 mu'`; the acceleration of O per force at O is then
+//! `Lambda = Pi D^-1 Pi' + X P_B+^-1 X'`, `X = phi* - Pi D^-1 mu'`, a sum of two semidefinite terms, and `P(k') = Lambda^-1`.
 //! Cost: O(bodies + modes), plus O(children^2 modes) per flexible body.
 #![expect(non_snake_case, reason = "symbols follow the table in dynamics/mod.rs")]
 
 use super::pose_outward::PoseScratch;
 use crate::dynamics::DynamicsError;
-use crate::dynamics::modal_block::{ModalBlock, SingularBlock};
+use crate::dynamics::modal_block::{ModalBlock, SingularBlock, outer_sum};
 use crate::model::hinge::MAX_RATES;
 use crate::model::{Body, BodyKind, HingeKind, System};
 use crate::spatial::SpatialInertia;
-use crate::spatial::shift::motion_to;
-use nalgebra::Vector6;
+use crate::spatial::shift::{force_from, motion_to};
+use nalgebra::{Matrix6, Vector3, Vector6};
 
 /// What the sweep leaves of one hinge.
 #[derive(Debug, Clone, Copy)]
@@ -35,12 +39,29 @@ pub struct BodyInertia {
 pub struct FlexibleElimination {
     /// Factored `D_fl`.
     pub modal_block: ModalBlock,
-    /// `mu'`, one row per mode, at B.
+    /// `mu' = P_fr`, one row per mode, at B.
     pub mu: Vec<Vector6<f64>>,
     /// `E = D_fl^-1 mu'`, one row per mode.
     pub gain_modal: Vec<Vector6<f64>>,
-    /// Children whose O moves with respect to this body's O as modes change.
+    /// Children that the modes move.
     pub moved_children: Vec<usize>,
+    /// What a root that the modes move needs beside these.
+    pub root: Option<RootElimination>,
+}
+
+/// The inboard hinge of a body whose modes move it; all in B axes, O being the point of the hinge.
+#[derive(Debug, Clone)]
+pub struct RootElimination {
+    /// `Pi(O)`, one row per mode.
+    pub shape: Vec<Vector6<f64>>,
+    /// Modal acceleration per force at O, one row per mode.
+    pub modal_per_force: Vec<Vector6<f64>>,
+    /// Acceleration of B per force at O.
+    pub frame_per_force: Matrix6<f64>,
+    /// `P_B+^-1`.
+    pub frame_inverse: Matrix6<f64>,
+    /// `P(k') = Lambda^-1` at O in B axes.
+    pub P: Matrix6<f64>,
 }
 
 /// What the inertia sweep writes.
@@ -67,21 +88,19 @@ impl InertiaScratch {
         };
         let mut children = vec![Vec::new(); system.bodies.len()];
         for (k, body) in system.bodies.iter().enumerate() {
-            if let Some(parent) = body.parent {
-                let root_moves = system.bodies[parent].flexible().is_some_and(|f| f.inboard.moves());
-                if body.parent_side.moves() || root_moves {
-                    children[parent].push(k);
-                }
+            if let Some(parent) = body.parent.filter(|_| body.parent_side.moves()) {
+                children[parent].push(k);
             }
         }
         let eliminate = |(k, body): (usize, &Body)| {
             body.flexible().map(|flexible| {
                 let n = flexible.mode_count();
                 FlexibleElimination {
-                    modal_block: ModalBlock::new(n, children[k].len(), flexible.inboard.moves()),
+                    modal_block: ModalBlock::new(n, children[k].len()),
                     mu: vec![Vector6::zeros(); n],
                     gain_modal: vec![Vector6::zeros(); n],
                     moved_children: children[k].clone(),
+                    root: flexible.inboard.moves().then(|| RootElimination::new(n)),
                 }
             })
         };
@@ -130,44 +149,74 @@ pub fn inertia_inward(system: &System, pose: &PoseScratch, out: &mut InertiaScra
 /// Modes of flexible body `k`: `P_cr+ = P_rr - mu D_fl^-1 mu'` (Eq. 32), moved to O.
 fn eliminate_modes(pose: &PoseScratch, k: usize, index: usize, out: &mut InertiaScratch) -> Result<(), SingularBlock> {
     let part = &pose.flexible[index];
-    let FlexibleElimination { modal_block, mu, gain_modal, moved_children } = &mut out.flexible[index];
-    let (inertia, shape_inboard) = (&part.inertia, &part.shape_inboard);
-
-    // mu of the body alone: M_fr - Pi_B' M_rr
-    modal_block.begin(&inertia.row, &inertia.rigid, shape_inboard)?;
-    mu.copy_from_slice(&inertia.row);
-    for (mu, s) in mu.iter_mut().zip(shape_inboard) {
-        *mu -= inertia.rigid.times(s);
-    }
+    let FlexibleElimination { modal_block, mu, gain_modal, moved_children, root } = &mut out.flexible[index];
+    modal_block.begin();
+    mu.copy_from_slice(&part.inertia.row);
     for &child in moved_children.iter() {
         let child_pose = &pose.bodies[child];
         let S = out.bodies[child].S;
-        let shape = match child_pose.shape {
-            Some(start) => &pose.shape[start..start + mu.len()],
-            None => &[],
-        };
-        let fill = |Y: &mut [Vector6<f64>]| {
-            Y.fill(Vector6::zeros());
-            Y.iter_mut().zip(shape).for_each(|(y, s)| *y = *s);
-            Y.iter_mut().zip(shape_inboard).for_each(|(y, s)| *y -= motion_to(&child_pose.l, s));
-            for (mu, y) in mu.iter_mut().zip(Y.iter()) {
-                *mu += crate::spatial::shift::force_from(&child_pose.l, &S.times(y));
-            }
-        };
-        modal_block.add_child(fill, &S)?;
+        let shape = child_pose.shape.map_or(&[][..], |start| &pose.shape[start..start + mu.len()]);
+        for (mu, y) in mu.iter_mut().zip(shape) {
+            *mu += force_from(&child_pose.l, &S.times(y));
+        }
+        modal_block.add_child(|Y| Y.copy_from_slice(shape), &S)?;
     }
     gain_modal.copy_from_slice(mu);
     modal_block.solve_rows(gain_modal);
 
-    let mut taken = nalgebra::Matrix6::zeros();
-    for (mu, e) in mu.iter().zip(gain_modal.iter()) {
-        taken.ger(1.0, mu, e, 1.0);
-    }
     let own = &mut out.bodies[k];
-    let left = SpatialInertia::from_matrix(&(own.P.matrix() - taken));
-    // from B to O at x: the origin of B lies at -x from O
-    own.P_hinge = left.moved_by(&-part.inboard.position).rotated(&part.inboard.rotation.transpose());
+    let left = own.P.matrix() - outer_sum(mu, gain_modal);
+    let (x, turned) = (part.inboard.position, part.inboard.rotation.transpose());
+    own.P_hinge = match root {
+        // from B to O at x: the origin of B lies at -x from O
+        None => SpatialInertia::from_matrix(&left).moved_by(&-x).rotated(&turned),
+        Some(root) => {
+            root.eliminate(&x, &part.shape_inboard, &left, modal_block, gain_modal)?;
+            SpatialInertia::from_matrix(&root.P).rotated(&turned)
+        }
+    };
     Ok(())
+}
+
+impl RootElimination {
+    fn new(n: usize) -> Self {
+        let rows = vec![Vector6::zeros(); n];
+        let zero = Matrix6::zeros();
+        Self { shape: rows.clone(), modal_per_force: rows, frame_per_force: zero, frame_inverse: zero, P: zero }
+    }
+
+    /// From `P_B+` (`left`) and the gain `E` of the modes with B held to the inertia felt at O, which lies at `x`.
+    fn eliminate(
+        &mut self,
+        x: &Vector3<f64>,
+        shape_inboard: &[Vector6<f64>],
+        left: &Matrix6<f64>,
+        modal_block: &ModalBlock,
+        gain_modal: &[Vector6<f64>],
+    ) -> Result<(), SingularBlock> {
+        for (s, b) in self.shape.iter_mut().zip(shape_inboard) {
+            *s = motion_to(x, b);
+        }
+        self.modal_per_force.copy_from_slice(&self.shape);
+        modal_block.solve_rows(&mut self.modal_per_force);
+        let mut direct = outer_sum(&self.shape, &self.modal_per_force);
+        // X = phi* - Pi E
+        let mut X = -outer_sum(&self.shape, gain_modal);
+        for i in 0..6 {
+            let column = motion_to(x, &Vector6::ith(i, 1.0));
+            let sum = X.column(i) + column;
+            X.set_column(i, &sum);
+        }
+        let symmetric = (left + left.transpose()) * 0.5;
+        self.frame_inverse = symmetric.cholesky().ok_or(SingularBlock)?.inverse();
+        self.frame_per_force = self.frame_inverse * X.transpose();
+        direct += X * self.frame_per_force;
+        self.P = ((direct + direct.transpose()) * 0.5).cholesky().ok_or(SingularBlock)?.inverse();
+        for (m, e) in self.modal_per_force.iter_mut().zip(gain_modal) {
+            *m -= self.frame_per_force.tr_mul(e);
+        }
+        Ok(())
+    }
 }
 
 /// Pivots at or below this multiple of what they were formed from are rounding, not inertia.

@@ -19,7 +19,7 @@ pub struct BodyVelocity {
     pub V: Vector6<f64>,
     /// Bias acceleration at O in O axes: of O+ on its parent and of the hinge; with `H* theta_ddot` of a prescribed hinge.
     pub a: Vector6<f64>,
-    /// Bias acceleration of B seen from O in B axes; zero for a rigid body.
+    /// Of a flexible body, in B axes: bias acceleration of O seen from B if modes move O, else that of B seen from O.
     pub a_inboard: Vector6<f64>,
     /// Rigid rows of b in the recursion's frame.
     pub b: Vector6<f64>,
@@ -103,7 +103,8 @@ pub fn velocity_outward(system: &System, state: &State, pose: &PoseScratch, out:
                     }
                     let bias = part.inboard.bias_at(&flexible.inboard, &x, &angular(&V), eta_dot);
                     result.V = V;
-                    result.a_inboard = -motion_to(&-x, &bias);
+                    // where modes move O the sweeps need its bias there, else that of B
+                    result.a_inboard = if flexible.inboard.moves() { bias } else { -motion_to(&-x, &bias) };
                     let b_modal = &mut out.b_modal[body.modal_range()];
                     result.b = part.inertia.velocity_terms(&flexible.integrals, flexible.order, &angular(&V), eta_dot, b_modal);
                 }
