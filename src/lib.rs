@@ -5,4 +5,5 @@ pub mod integrate;
 #[cfg(feature = "hdf5")]
 pub mod io;
 pub mod model;
+pub mod output;
 pub mod spatial;
