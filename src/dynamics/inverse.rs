@@ -275,6 +275,16 @@ impl NewtonEuler {
         }
     }
 
+    /// Size of the moment (N m) that turns body `k` alone: what is left of it at a free hinge is rounding, and must be measured against it.
+    fn turning_moment(&self, system: &System, workspace: &Workspace, k: usize) -> f64 {
+        let spin = angular(&workspace.acceleration.alpha[k]);
+        match (&system.bodies[k].kind, workspace.pose.bodies[k].flexible) {
+            (BodyKind::Flexible(_), Some(index)) => (workspace.pose.flexible[index].inertia.rigid.rotational * spin).amax(),
+            (BodyKind::Rigid(inertia), _) => (inertia.rotational * spin).amax(),
+            (BodyKind::Flexible(_), None) => 0.0,
+        }
+    }
+
     /// Compares the loads and equations of the last evaluation in `workspace` with an independent sweep.
     pub fn audit(&mut self, system: &System, state: &State, workspace: &Workspace) -> AuditResidual {
         let acceleration = &workspace.acceleration;
@@ -289,6 +299,7 @@ impl NewtonEuler {
                 // a free body has no load to compare with: its inertial force sets the scale
                 size[part] = size[part].max(rows(&mine)).max(rows(&felt));
             }
+            size[0] = size[0].max(self.turning_moment(system, workspace, k));
         }
         let relative = |d: f64, s: f64| if s > 0.0 { d / s } else { d };
         let load = relative(difference[0], size[0]).max(relative(difference[1], size[1]));

@@ -1,4 +1,5 @@
 //! Files to model types and back: the only layer that opens HDF5 files. It holds no physics and uses `model` alone.
+//! [`results_file`] writes time histories; what they mean is the business of the layer above.
 //!
 //! A modal file (schema `flexible-body-modes` 1.0) comes from elsewhere and is never trusted: `guard` decides what may be read
 //! at all, [`modal_file`] turns datasets into a [`crate::model::modal_body::ModalBody`], [`modal_mesh`] reads the per-node data that
@@ -23,6 +24,7 @@ mod lumped;
 pub mod modal_check;
 pub mod modal_file;
 pub mod modal_mesh;
+pub mod results_file;
 
 pub use error::ModalFileError;
 pub use header::{Header, NodeMassKind};
@@ -30,3 +32,4 @@ pub use health::{Bound, HealthReport, Rule, RuleResult, Verdict};
 pub use modal_check::{Examination, examine};
 pub use modal_file::{Coupling, InterfaceSupport, ModalFile, ModeKind};
 pub use modal_mesh::{StressLocation, StressModes, SurfaceMesh};
+pub use results_file::{ResultsError, ResultsFile};

@@ -212,7 +212,8 @@ mod tests {
         let evaluation = Evaluation::of(&system, &state)?;
         let names: Vec<_> = evaluation.hinges.iter().map(|(name, _)| name).collect();
         assert_eq!(names, ["elbow", "shoulder"]);
-        assert!(evaluation.bodies.0.is_empty() && evaluation.audit.load_residual < 1e-13);
+        assert!(evaluation.bodies.0.is_empty());
+        assert!(evaluation.audit.load_residual < 1e-13, "{evaluation:?}");
 
         let text = serde_json::to_string(&evaluation)?;
         let read: serde_json::Value = serde_json::from_str(&text)?;

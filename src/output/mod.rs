@@ -1,5 +1,27 @@
-//! What leaves a run: records, peaks, the results file and the viewer stream.
+//! What leaves a run: peaks and limits, the results file, the viewer stream and the record of the closing report.
+//!
+//! [`OutputPlan`] says what is wanted, [`OutputSet`] is the observer that evaluates each output time once ([`frame`]) and hands it to
+//! the tracker and the writers. Names and units are those of [`channels`]. Nothing here prints.
 
+pub mod channels;
 pub mod evaluation;
+pub mod frame;
+#[cfg(feature = "rerun")]
+pub mod picture;
+pub mod plan;
+pub mod report;
+#[cfg(feature = "rerun")]
+pub mod rerun;
+#[cfg(feature = "hdf5")]
+pub mod results;
+pub mod set;
+pub mod surface;
+pub mod tracker;
 
 pub use evaluation::Evaluation;
+pub use plan::{BodyBox, BodySurface, ModalFileRecord, Monitor, OutputPlan, PlanError};
+pub use report::RunReport;
+#[cfg(feature = "rerun")]
+pub use rerun::{ViewerError, ViewerTarget};
+pub use set::OutputSet;
+pub use surface::Surface;

@@ -1,0 +1,248 @@
+//! Results files: time histories by name in HDF5, schema `pliant-results` 1.0. The layer above says what is in them.
+//!
+//! Every series is a dataset with one row per output time. Rows are kept in memory and appended in blocks; after each block the file
+//! is flushed, so that a run that is killed leaves a readable file with all but the last rows. Texts are of fixed length.
+
+use hdf5::types::{FixedUnicode, TypeDescriptor};
+use hdf5::{Dataset, Extent, Group, Location, SimpleExtents};
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// Rows per block, which is also the chunk length.
+pub const BLOCK_ROWS: usize = 64;
+/// Longest text attribute (bytes).
+const TEXT_LIMIT: usize = 4096;
+
+/// Why a results file is not, or no longer, written.
+#[derive(Debug, Error, Clone, PartialEq, Eq)]
+pub enum ResultsError {
+    /// The file cannot be made.
+    #[error("results file \"{}\": cannot be created: {cause}; name a file in a folder that exists and may be written", file.display())]
+    Create {
+        /// Path.
+        file: PathBuf,
+        /// What the system says.
+        cause: String,
+    },
+    /// A write failed.
+    #[error(
+        "results file \"{}\": writing stopped after {rows} output times: {cause}; look for a full disk; what was written before is kept",
+        file.display()
+    )]
+    Write {
+        /// Path.
+        file: PathBuf,
+        /// Rows that are in the file.
+        rows: u64,
+        /// What the system says.
+        cause: String,
+    },
+}
+
+/// One time history.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SeriesSpec {
+    /// Path of groups and dataset, each name escaped by [`escape`].
+    pub path: String,
+    /// Numbers per output time, at least one; none for one number per time without a second dimension.
+    pub width: Option<usize>,
+    /// Names and texts.
+    pub attributes: Vec<(&'static str, String)>,
+}
+
+/// A small fixed group of texts and bytes.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Preface {
+    /// Attributes of the root.
+    pub attributes: Vec<(&'static str, String)>,
+    /// Datasets of bytes.
+    pub bytes: Vec<(String, Vec<u8>)>,
+    /// Groups with attributes.
+    pub groups: Vec<(String, Vec<(&'static str, String)>)>,
+}
+
+/// A name as a single step of a path: `%`, `/` and the names `.` and `..` are percent-encoded.
+#[must_use]
+pub fn escape(name: &str) -> String {
+    match name {
+        "." | ".." => name.replace('.', "%2E"),
+        other => other.replace('%', "%25").replace('/', "%2F").replace('\0', "%00"),
+    }
+}
+
+/// A results file that is being written.
+#[derive(Debug)]
+pub struct ResultsFile {
+    path: PathBuf,
+    file: hdf5::File,
+    series: Vec<(Dataset, Option<usize>)>,
+    /// Numbers per output time of all series together.
+    row: usize,
+    buffer: Vec<f64>,
+    column: Vec<f64>,
+    written: usize,
+}
+
+impl ResultsFile {
+    /// Makes the file with empty series; a file of that name is replaced.
+    ///
+    /// # Errors
+    /// If the file cannot be made.
+    pub fn create(path: &Path, preface: &Preface, series: &[SeriesSpec]) -> Result<Self, ResultsError> {
+        let fail = |cause: String| ResultsError::Create { file: path.to_owned(), cause };
+        if std::fs::metadata(path).is_ok_and(|m| !m.is_file()) {
+            return Err(fail("not a regular file".into()));
+        }
+        // the system's own words on a missing folder or a read-only file are clearer than those of libhdf5
+        std::fs::OpenOptions::new().write(true).create(true).truncate(false).open(path).map_err(|e| fail(e.to_string()))?;
+        hdf5::silence_errors(true);
+        let made = || -> hdf5::Result<(hdf5::File, Vec<_>)> {
+            let file = hdf5::File::create(path)?;
+            write_preface(&file, preface)?;
+            let datasets = series.iter().map(|spec| Ok((create_series(&file, spec)?, spec.width)));
+            let datasets = datasets.collect::<hdf5::Result<Vec<_>>>()?;
+            file.flush()?;
+            Ok((file, datasets))
+        };
+        let (file, datasets) = made().map_err(|e| fail(e.to_string()))?;
+        let row = series.iter().map(|s| s.width.unwrap_or(1)).sum();
+        Ok(Self {
+            path: path.to_owned(),
+            file,
+            series: datasets,
+            row,
+            buffer: Vec::with_capacity(row * BLOCK_ROWS),
+            column: Vec::with_capacity(BLOCK_ROWS),
+            written: 0,
+        })
+    }
+
+    /// The path as given.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Rows that are in the file.
+    #[must_use]
+    pub fn rows(&self) -> u64 {
+        self.written as u64
+    }
+
+    /// Takes one row: the numbers of all series in their order.
+    ///
+    /// # Errors
+    /// If the row completes a block and the block cannot be written.
+    pub fn push(&mut self, row: impl IntoIterator<Item = f64>) -> Result<(), ResultsError> {
+        let start = self.buffer.len();
+        self.buffer.extend(row);
+        debug_assert_eq!(self.buffer.len() - start, self.row, "a row has one number per column");
+        self.buffer.resize(start + self.row, f64::NAN);
+        if self.buffer.len() >= self.row * BLOCK_ROWS { self.flush() } else { Ok(()) }
+    }
+
+    /// Appends what is buffered and brings the file up to date.
+    ///
+    /// # Errors
+    /// If a write fails.
+    pub fn flush(&mut self) -> Result<(), ResultsError> {
+        let result = self.append();
+        self.buffer.clear();
+        result.map_err(|e| self.failed(&e))
+    }
+
+    fn failed(&self, error: &hdf5::Error) -> ResultsError {
+        ResultsError::Write { file: self.path.clone(), rows: self.rows(), cause: error.to_string() }
+    }
+
+    fn append(&mut self) -> hdf5::Result<()> {
+        let rows = if self.row == 0 { 0 } else { self.buffer.len() / self.row };
+        if rows == 0 {
+            return Ok(());
+        }
+        let end = self.written + rows;
+        let mut offset = 0;
+        for (dataset, width) in &self.series {
+            match *width {
+                None => {
+                    self.column.clear();
+                    self.column.extend(self.buffer.chunks_exact(self.row).map(|row| row[offset]));
+                    dataset.resize(end)?;
+                    dataset.write_slice(self.column.as_slice(), self.written..end)?;
+                }
+                Some(width) => {
+                    dataset.resize((end, width))?;
+                    for (i, row) in self.buffer.chunks_exact(self.row).enumerate() {
+                        dataset.write_slice(&row[offset..offset + width], (self.written + i, ..))?;
+                    }
+                }
+            }
+            offset += width.unwrap_or(1);
+        }
+        self.file.flush()?;
+        self.written = end;
+        Ok(())
+    }
+
+    /// Writes the last rows and how the run ended, and closes the file.
+    ///
+    /// # Errors
+    /// If a write fails.
+    pub fn finish(mut self, completed: bool, end_time: f64) -> Result<u64, ResultsError> {
+        self.flush()?;
+        let ended = || -> hdf5::Result<()> {
+            self.file.new_attr::<u8>().create("completed")?.write_scalar(&u8::from(completed))?;
+            self.file.new_attr::<f64>().create("end_time")?.write_scalar(&end_time)?;
+            self.file.flush()
+        };
+        ended().map_err(|e| self.failed(&e))?;
+        Ok(self.rows())
+    }
+}
+
+fn write_preface(file: &hdf5::File, preface: &Preface) -> hdf5::Result<()> {
+    preface.attributes.iter().try_for_each(|(name, text)| write_text(file, name, text))?;
+    for (path, bytes) in &preface.bytes {
+        let (group, name) = parent(file, path)?;
+        group.new_dataset_builder().with_data(bytes.as_slice()).create(name)?;
+    }
+    for (path, attributes) in &preface.groups {
+        let (above, name) = parent(file, path)?;
+        let group = if above.link_exists(name) { above.group(name)? } else { above.create_group(name)? };
+        attributes.iter().try_for_each(|(name, text)| write_text(&group, name, text))?;
+    }
+    Ok(())
+}
+
+/// The group that holds the last step of `path`, made if need be, and that step.
+fn parent<'p>(file: &hdf5::File, path: &'p str) -> hdf5::Result<(Group, &'p str)> {
+    let (groups, name) = path.rsplit_once('/').unwrap_or(("", path));
+    let mut group = file.as_group()?;
+    for step in groups.split('/').filter(|step| !step.is_empty()) {
+        group = if group.link_exists(step) { group.group(step)? } else { group.create_group(step)? };
+    }
+    Ok((group, name))
+}
+
+fn create_series(file: &hdf5::File, spec: &SeriesSpec) -> hdf5::Result<Dataset> {
+    let (group, name) = parent(file, &spec.path)?;
+    let mut extents = vec![Extent::resizable(0)];
+    extents.extend(spec.width.map(Extent::fixed));
+    let chunk: Vec<usize> = std::iter::once(BLOCK_ROWS).chain(spec.width).collect();
+    let builder = group.new_dataset::<f64>().shape(SimpleExtents::from_vec(extents));
+    let dataset = builder.chunk(chunk).shuffle().deflate(4).fletcher32().create(name)?;
+    spec.attributes.iter().try_for_each(|(name, text)| write_text(&dataset, name, text))?;
+    Ok(dataset)
+}
+
+/// A text attribute of fixed length, cut at 4 KiB.
+fn write_text(location: &Location, name: &str, text: &str) -> hdf5::Result<()> {
+    let mut end = text.len().min(TEXT_LIMIT);
+    while !text.is_char_boundary(end) {
+        end -= 1;
+    }
+    let text = text[..end].replace('\0', " ");
+    let value: FixedUnicode<TEXT_LIMIT> = text.parse().map_err(|_| hdf5::Error::from("a text with a NUL"))?;
+    let attribute = location.new_attr_builder().empty_as(&TypeDescriptor::FixedUnicode(text.len().max(1))).create(name)?;
+    attribute.as_writer().write_scalar(&value)
+}

@@ -1,0 +1,233 @@
+//! What a run is asked to put out. Everything not named here is not evaluated.
+
+use super::surface::Surface;
+use crate::model::System;
+use std::sync::Arc;
+use thiserror::Error;
+
+/// A modal file that a scene uses, as the results file keeps it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ModalFileRecord {
+    /// Name of the body.
+    pub body: String,
+    /// Path as the scene gives it.
+    pub path: String,
+    /// Digest of the file's data, lower-case hexadecimal.
+    pub content_sha256: String,
+}
+
+/// The surface of a flexible body.
+#[derive(Debug, Clone)]
+pub struct BodySurface {
+    /// Index of the body.
+    pub body: usize,
+    /// Mesh with one shape per retained mode; share it between bodies of one file and one choice of modes.
+    pub surface: Arc<Surface>,
+    /// True if stress is evaluated at every output time.
+    pub stress: bool,
+}
+
+/// The box that stands for a rigid body in pictures.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BodyBox {
+    /// Index of the body.
+    pub body: usize,
+    /// Edge lengths along the body axes (m).
+    pub size: [f64; 3],
+    /// Centre in body axes (m).
+    pub center: [f64; 3],
+}
+
+/// Limits to watch at every output time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Monitor {
+    /// Magnitudes of the load at the inboard hinge of a body.
+    Hinge {
+        /// Index of the body that the hinge carries.
+        body: usize,
+        /// N m.
+        moment_limit: Option<f64>,
+        /// N.
+        force_limit: Option<f64>,
+    },
+    /// Von Mises stress of a flexible body.
+    Body {
+        /// Index of the body.
+        body: usize,
+        /// Pa.
+        stress_limit: Option<f64>,
+    },
+}
+
+/// Everything that a run puts out.
+#[derive(Debug, Clone)]
+pub struct OutputPlan {
+    /// Name of the scene.
+    pub scene_name: String,
+    /// Text of the scene file, kept in the results file.
+    pub scene_text: String,
+    /// Modal files of the scene.
+    pub modal_files: Vec<ModalFileRecord>,
+    /// Bodies at whose inboard hinge the load is an output, in the order of the outputs.
+    pub hinges: Vec<usize>,
+    /// Flexible bodies that are drawn or searched for stress.
+    pub surfaces: Vec<BodySurface>,
+    /// Boxes of rigid bodies; a rigid body without one is drawn as the cuboid of equal mass and inertia.
+    pub boxes: Vec<BodyBox>,
+    /// Limits.
+    pub monitors: Vec<Monitor>,
+    /// Factor on the deformation in pictures; never on numbers.
+    pub deformation_scale: f64,
+    /// True if an independent Newton-Euler sweep checks the loads at every output time.
+    pub audit: bool,
+}
+
+impl Default for OutputPlan {
+    fn default() -> Self {
+        Self {
+            scene_name: String::new(),
+            scene_text: String::new(),
+            modal_files: Vec::new(),
+            hinges: Vec::new(),
+            surfaces: Vec::new(),
+            boxes: Vec::new(),
+            monitors: Vec::new(),
+            deformation_scale: 1.0,
+            audit: false,
+        }
+    }
+}
+
+/// Why a plan does not fit its system.
+#[derive(Debug, Error, Clone, PartialEq)]
+pub enum PlanError {
+    /// An index without a body.
+    #[error("output of body {body}, but the system has {count} bodies; name a body or hinge of the scene")]
+    NoBody {
+        /// Index asked for.
+        body: usize,
+        /// Number of bodies.
+        count: usize,
+    },
+    /// A surface that does not fit its body.
+    #[error(
+        "surface of body \"{body}\" with {found} modes, but the body retains {expected}; read the surface with the same choice of modes"
+    )]
+    Modes {
+        /// Name of the body.
+        body: String,
+        /// Shapes of the surface.
+        found: usize,
+        /// Retained modes.
+        expected: usize,
+    },
+    /// Stress of a body without stress modes.
+    #[error("stress of body \"{body}\" is asked for, but {reason}; drop the stress monitor or write the modal file with stress modes")]
+    NoStress {
+        /// Name of the body.
+        body: String,
+        /// What is missing.
+        reason: &'static str,
+    },
+    /// A limit or scale that is no positive number.
+    #[error("{what} is {value}; give a positive number")]
+    NotPositive {
+        /// What it limits.
+        what: String,
+        /// The value found.
+        value: f64,
+    },
+}
+
+impl OutputPlan {
+    /// Holds the plan against `system`.
+    ///
+    /// # Errors
+    /// [`PlanError`] with the first thing that does not fit.
+    pub fn check(&self, system: &System) -> Result<(), PlanError> {
+        let count = system.bodies.len();
+        let name = |body: usize| system.bodies.get(body).map(|b| b.name.clone()).ok_or(PlanError::NoBody { body, count });
+        let positive = |what: String, value: Option<f64>| match value {
+            Some(value) if !(value > 0.0 && value.is_finite()) => Err(PlanError::NotPositive { what, value }),
+            _ => Ok(()),
+        };
+        positive("deformation_scale".into(), Some(self.deformation_scale))?;
+        for &body in self.hinges.iter().chain(self.boxes.iter().map(|b| &b.body)) {
+            name(body)?;
+        }
+        for surface in &self.surfaces {
+            let (body, expected) = (name(surface.body)?, system.bodies[surface.body].mode_count());
+            let found = surface.surface.displacement.len();
+            if found != expected {
+                return Err(PlanError::Modes { body, found, expected });
+            }
+            if surface.stress && surface.surface.stress.is_none() {
+                return Err(PlanError::NoStress { body, reason: "its modal file has no stress modes" });
+            }
+        }
+        for monitor in &self.monitors {
+            match *monitor {
+                Monitor::Hinge { body, moment_limit, force_limit } => {
+                    name(body)?;
+                    let hinge = &system.bodies[body].hinge.name;
+                    positive(format!("the moment limit of hinge \"{hinge}\""), moment_limit)?;
+                    positive(format!("the force limit of hinge \"{hinge}\""), force_limit)?;
+                }
+                Monitor::Body { body, stress_limit } => {
+                    let name = name(body)?;
+                    positive(format!("the stress limit of body \"{name}\""), stress_limit)?;
+                    if !self.surfaces.iter().any(|s| s.body == body && s.stress) {
+                        return Err(PlanError::NoStress { body: name, reason: "no surface with stress is given for it" });
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Bodies at whose hinge a load is evaluated: outputs first, then those that only a monitor asks for.
+    #[must_use]
+    pub fn loaded_hinges(&self) -> Vec<usize> {
+        let monitored = self.monitors.iter().filter_map(|m| match *m {
+            Monitor::Hinge { body, .. } => Some(body),
+            Monitor::Body { .. } => None,
+        });
+        let mut bodies = Vec::new();
+        for body in self.hinges.iter().copied().chain(monitored) {
+            if !bodies.contains(&body) {
+                bodies.push(body);
+            }
+        }
+        bodies
+    }
+
+    /// Limits of moment (N m) and force (N) at the hinge of `body`, the tightest of each.
+    #[must_use]
+    pub fn hinge_limits(&self, body: usize) -> (Option<f64>, Option<f64>) {
+        let mut limits = (None, None);
+        for monitor in &self.monitors {
+            if let Monitor::Hinge { body: b, moment_limit, force_limit } = *monitor
+                && b == body
+            {
+                limits = (tighter(limits.0, moment_limit), tighter(limits.1, force_limit));
+            }
+        }
+        limits
+    }
+
+    /// Limit of the stress of `body` (Pa), the tightest.
+    #[must_use]
+    pub fn stress_limit(&self, body: usize) -> Option<f64> {
+        self.monitors.iter().fold(None, |limit, monitor| match *monitor {
+            Monitor::Body { body: b, stress_limit } if b == body => tighter(limit, stress_limit),
+            _ => limit,
+        })
+    }
+}
+
+fn tighter(a: Option<f64>, b: Option<f64>) -> Option<f64> {
+    match (a, b) {
+        (Some(a), Some(b)) => Some(a.min(b)),
+        (a, b) => a.or(b),
+    }
+}

@@ -1,0 +1,142 @@
+//! The closing report of a run as a record: what `pliant run --json` prints.
+
+use super::evaluation::{Evaluation, Named};
+use crate::integrate::Outcome;
+use serde::Serialize;
+
+/// Error figures; none where a figure does not apply.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct ErrorFigures {
+    /// Largest |E(t) - E(0) - work| at output times, relative to the largest kinetic energy.
+    pub energy: f64,
+    /// Drift of linear and angular momentum of a system that nothing outside acts on, relative to the momentum its kinetic energy allows.
+    pub momentum: Option<f64>,
+    /// Largest residual of the independent Newton-Euler sweep, relative to the largest load of its kind.
+    pub audit: Option<f64>,
+    /// Largest violation of a closure (m or rad).
+    pub closure: Option<f64>,
+    /// Largest accepted local error estimate of the step control.
+    pub local: Option<f64>,
+}
+
+/// Largest load magnitudes at one hinge over the output times.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct HingePeak {
+    /// N m.
+    pub moment: f64,
+    /// N.
+    pub force: f64,
+    /// Time of the moment's peak, or of the force's at a hinge that never carries a moment (s).
+    pub time_s: f64,
+    /// s.
+    pub moment_time_s: f64,
+    /// s.
+    pub force_time_s: f64,
+}
+
+/// Largest stress of one body over the output times.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct BodyPeak {
+    /// Pa.
+    pub von_mises: f64,
+    /// s.
+    pub time_s: f64,
+    /// Node of the modal file.
+    pub node: usize,
+    /// Undeformed place of the node in body axes (m).
+    pub position: [f64; 3],
+}
+
+/// Peaks over the output times.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct Peaks {
+    /// By hinge.
+    pub hinges: Named<HingePeak>,
+    /// By body.
+    pub bodies: Named<BodyPeak>,
+}
+
+/// A stay above a limit.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Exceedance {
+    /// "hinge" or "body".
+    pub kind: &'static str,
+    /// Name of the hinge or body.
+    pub name: String,
+    /// "moment", "force" or "von_mises".
+    pub quantity: &'static str,
+    /// Unit of limit and peak.
+    pub unit: &'static str,
+    /// The limit.
+    pub limit: f64,
+    /// Largest value of this stay.
+    pub peak: f64,
+    /// First output time above the limit (s).
+    pub start_s: f64,
+    /// First output time back at or below it; none if the run ended above (s).
+    pub end_s: Option<f64>,
+}
+
+/// A file or stream that the run wrote.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Written {
+    /// "results" or "viewer".
+    pub kind: &'static str,
+    /// Path or address.
+    pub target: String,
+    /// Output times that reached it.
+    pub frames: u64,
+    /// What went wrong, if something did; what was written before is kept.
+    pub problem: Option<String>,
+}
+
+/// How a run ended.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct OutcomeRecord {
+    /// "completed", "stopped" or "failed".
+    pub status: &'static str,
+    /// Why it failed.
+    pub message: Option<String>,
+}
+
+impl From<&Outcome> for OutcomeRecord {
+    fn from(outcome: &Outcome) -> Self {
+        match outcome {
+            Outcome::Completed => Self { status: "completed", message: None },
+            Outcome::Stopped => Self { status: "stopped", message: None },
+            Outcome::Failed(failure) => Self { status: "failed", message: Some(failure.to_string()) },
+        }
+    }
+}
+
+/// The closing report.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RunReport {
+    /// Simulated time (s).
+    pub simulated_s: f64,
+    /// Wall-clock time (s).
+    pub wall_s: f64,
+    /// Name of the method.
+    pub integrator: String,
+    /// Accepted steps.
+    pub steps: u64,
+    /// Rejected steps.
+    pub rejected_steps: u64,
+    /// Evaluations of the dynamics, output included.
+    pub evaluations: u64,
+    /// Error figures.
+    pub errors: ErrorFigures,
+    /// Peaks.
+    pub peaks: Peaks,
+    /// Evaluation at the end; none if the end state has no evaluation.
+    #[serde(rename = "final")]
+    pub end: Option<Evaluation>,
+    /// What the run did not evaluate.
+    pub left_out: Vec<String>,
+    /// Stays above limits, in the order of their start.
+    pub exceedances: Vec<Exceedance>,
+    /// Files and streams.
+    pub files: Vec<Written>,
+    /// How the run ended.
+    pub outcome: OutcomeRecord,
+}

@@ -1,0 +1,126 @@
+//! The results file of a run: `channels` laid out as HDF5 paths, one row per output time.
+//!
+//! The order of [`ResultsWriter::write`] is that of [`result_channels`]; a test holds the two together.
+
+use super::channels::{Channel, result_channels};
+use super::frame::OutputFrame;
+use super::plan::OutputPlan;
+use crate::integrate::Sample;
+use crate::io::results_file::{Preface, ResultsError, ResultsFile, SeriesSpec, escape};
+use crate::model::System;
+use crate::spatial::rotation::quaternion_of_matrix;
+use nalgebra::Vector6;
+use std::path::Path;
+
+/// Name of the schema.
+pub const FORMAT: &str = "pliant-results";
+/// Version of the schema.
+pub const VERSION: &str = "1.0";
+
+/// Writes one results file.
+#[derive(Debug)]
+pub struct ResultsWriter {
+    file: ResultsFile,
+    row: Vec<f64>,
+    /// Last quaternion per body: of the two that mean the same, the one nearer to the last is written.
+    quaternions: Vec<[f64; 4]>,
+}
+
+impl ResultsWriter {
+    /// Makes the file with its attributes, the scene and empty series.
+    ///
+    /// # Errors
+    /// If the file cannot be made.
+    pub fn create(path: &Path, system: &System, plan: &OutputPlan) -> Result<Self, ResultsError> {
+        let series: Vec<_> = result_channels(system, plan).iter().map(series_of).collect();
+        let file = ResultsFile::create(path, &preface(plan), &series)?;
+        Ok(Self { file, row: Vec::new(), quaternions: vec![[1.0, 0.0, 0.0, 0.0]; system.bodies.len()] })
+    }
+
+    /// The path as given.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        self.file.path()
+    }
+
+    /// Rows that are in the file.
+    #[must_use]
+    pub fn rows(&self) -> u64 {
+        self.file.rows()
+    }
+
+    /// Takes one output time.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn write(&mut self, plan: &OutputPlan, sample: &Sample<'_>, frame: &OutputFrame) -> Result<(), ResultsError> {
+        let Sample { system, state, workspace, work, .. } = *sample;
+        let row = &mut self.row;
+        row.clear();
+        row.push(state.time);
+        // the loads of a frame start with those of the plan's hinges
+        for (&k, load) in plan.hinges.iter().zip(&frame.loads) {
+            let (body, load): (_, &Vector6<f64>) = (&system.bodies[k], load);
+            row.extend_from_slice(&state.position[body.position_range()]);
+            row.extend_from_slice(&state.velocity[body.velocity_range()]);
+            row.extend_from_slice(&workspace.acceleration.hinge[body.velocity_range()]);
+            row.extend(load.iter());
+        }
+        for &k in &system.definition_order {
+            let body = &system.bodies[k];
+            let pose = frame.frames[k].body_frame(body);
+            row.extend(pose.position.iter());
+            let last = &mut self.quaternions[k];
+            let mut quaternion = quaternion_of_matrix(&pose.rotation);
+            if quaternion.iter().zip(last.iter()).map(|(a, b)| a * b).sum::<f64>() < 0.0 {
+                quaternion = quaternion.map(|x| -x);
+            }
+            *last = quaternion;
+            row.extend(quaternion);
+            row.extend_from_slice(&state.modal_position[body.modal_range()]);
+            row.extend_from_slice(&state.modal_velocity[body.modal_range()]);
+            row.extend_from_slice(&workspace.acceleration.modal[body.modal_range()]);
+            if let Some(index) = plan.surfaces.iter().position(|s| s.body == k && s.stress) {
+                row.push(frame.stress[index].value);
+            }
+        }
+        row.extend([frame.energy.kinetic, frame.energy.strain, frame.energy.potential, work]);
+        row.extend(frame.audit.map(|audit| audit.load));
+        self.file.push(row.drain(..))
+    }
+
+    /// Writes the last rows and how the run ended; returns the number of rows.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn finish(self, completed: bool, end_time: f64) -> Result<u64, ResultsError> {
+        self.file.finish(completed, end_time)
+    }
+}
+
+fn series_of(channel: &Channel) -> SeriesSpec {
+    let owner = escape(&channel.owner);
+    let steps = [channel.group, owner.as_str(), channel.quantity];
+    let path = steps.into_iter().filter(|step| !step.is_empty()).collect::<Vec<_>>().join("/");
+    let mut attributes = vec![("unit", channel.unit.clone())];
+    let optional = [("frame", &channel.frame), ("point", &channel.point), ("side", &channel.side), ("components", &channel.components)];
+    attributes.extend(optional.into_iter().filter_map(|(name, text)| Some((name, text.clone()?))));
+    SeriesSpec { path, width: channel.width, attributes }
+}
+
+fn preface(plan: &OutputPlan) -> Preface {
+    let modal_file = |record: &super::plan::ModalFileRecord| {
+        let attributes = vec![("path", record.path.clone()), ("content_sha256", record.content_sha256.clone())];
+        (format!("scene/modal_files/{}", escape(&record.body)), attributes)
+    };
+    Preface {
+        attributes: vec![
+            ("format", FORMAT.into()),
+            ("version", VERSION.into()),
+            ("pliant_version", env!("CARGO_PKG_VERSION").into()),
+            ("scene_name", plan.scene_name.clone()),
+        ],
+        bytes: vec![("scene/toml".into(), plan.scene_text.clone().into_bytes())],
+        groups: plan.modal_files.iter().map(modal_file).collect(),
+    }
+}

@@ -1,0 +1,160 @@
+//! All outputs of a run behind one observer: each output time is evaluated once and handed to whoever wants it.
+//!
+//! A writer that fails is closed and its message kept; the run and the other writers go on.
+
+use super::evaluation::Evaluation;
+use super::frame::FrameEvaluator;
+use super::plan::{OutputPlan, PlanError};
+use super::report::{OutcomeRecord, RunReport, Written};
+#[cfg(feature = "rerun")]
+use super::rerun::{RerunStream, ViewerError, ViewerTarget};
+#[cfg(feature = "hdf5")]
+use super::results::ResultsWriter;
+use super::tracker::Tracker;
+use crate::integrate::{Flow, Observer, Outcome, Sample, Summary};
+#[cfg(feature = "hdf5")]
+use crate::io::ResultsError;
+use crate::model::System;
+use std::time::Duration;
+
+/// The outputs of one run.
+#[derive(Debug)]
+pub struct OutputSet<'s> {
+    system: &'s System,
+    plan: OutputPlan,
+    evaluator: FrameEvaluator,
+    tracker: Tracker,
+    #[cfg(feature = "hdf5")]
+    results: Option<ResultsWriter>,
+    #[cfg(feature = "rerun")]
+    viewer: Option<RerunStream>,
+    written: Vec<Written>,
+}
+
+impl<'s> OutputSet<'s> {
+    /// Outputs of `plan`, with nothing to write to yet.
+    ///
+    /// # Errors
+    /// If the plan does not fit the system.
+    pub fn new(system: &'s System, plan: OutputPlan) -> Result<Self, PlanError> {
+        plan.check(system)?;
+        Ok(Self {
+            system,
+            evaluator: FrameEvaluator::new(system, &plan),
+            tracker: Tracker::new(system, &plan),
+            plan,
+            #[cfg(feature = "hdf5")]
+            results: None,
+            #[cfg(feature = "rerun")]
+            viewer: None,
+            written: Vec::new(),
+        })
+    }
+
+    /// Adds a results file.
+    ///
+    /// # Errors
+    /// If the file cannot be made.
+    #[cfg(feature = "hdf5")]
+    pub fn write_results(&mut self, path: &std::path::Path) -> Result<(), ResultsError> {
+        self.results = Some(ResultsWriter::create(path, self.system, &self.plan)?);
+        Ok(())
+    }
+
+    /// Adds a viewer stream.
+    ///
+    /// # Errors
+    /// If no viewer can be reached or the file cannot be made.
+    #[cfg(feature = "rerun")]
+    pub fn open_viewer(&mut self, target: ViewerTarget) -> Result<(), ViewerError> {
+        self.viewer = Some(RerunStream::open(target, &self.plan, self.system)?);
+        Ok(())
+    }
+
+    /// The plan.
+    #[must_use]
+    pub fn plan(&self) -> &OutputPlan {
+        &self.plan
+    }
+
+    /// Peaks, limits and error figures so far.
+    #[must_use]
+    pub fn tracker(&self) -> &Tracker {
+        &self.tracker
+    }
+
+    /// Messages of writers that failed so far.
+    pub fn problems(&self) -> impl Iterator<Item = &str> {
+        self.written.iter().filter_map(|w| w.problem.as_deref())
+    }
+
+    /// Closes all writers and draws up the closing report. `left_out` names what the run did not evaluate.
+    #[must_use]
+    pub fn finish(mut self, summary: &Summary, integrator: &str, wall: Duration, left_out: Vec<String>) -> RunReport {
+        #[cfg(feature = "hdf5")]
+        self.finish_results(summary);
+        #[cfg(feature = "rerun")]
+        self.finish_viewer(summary);
+        let end = summary.end.is_finite().then(|| Evaluation::of(self.system, &summary.end).ok()).flatten();
+        RunReport {
+            simulated_s: summary.time,
+            wall_s: wall.as_secs_f64(),
+            integrator: integrator.to_owned(),
+            steps: summary.steps,
+            rejected_steps: summary.rejected,
+            evaluations: summary.evaluations,
+            errors: self.tracker.errors(summary.local_error),
+            peaks: self.tracker.peaks(self.system),
+            end,
+            left_out,
+            exceedances: self.tracker.exceedances().to_vec(),
+            files: self.written,
+            outcome: OutcomeRecord::from(&summary.outcome),
+        }
+    }
+
+    #[cfg(feature = "hdf5")]
+    fn finish_results(&mut self, summary: &Summary) {
+        if let Some(results) = self.results.take() {
+            let (target, before) = (results.path().display().to_string(), results.rows());
+            let finished = results.finish(summary.outcome == Outcome::Completed, summary.time);
+            let frames = finished.as_ref().copied().unwrap_or(before);
+            self.written.push(Written { kind: "results", target, frames, problem: finished.err().map(|e| e.to_string()) });
+        }
+    }
+
+    #[cfg(feature = "rerun")]
+    fn finish_viewer(&mut self, summary: &Summary) {
+        if let Some(mut viewer) = self.viewer.take() {
+            if let Outcome::Failed(failure) = &summary.outcome {
+                viewer.note(summary.time, &failure.to_string());
+            }
+            let target = viewer.target().to_owned();
+            match viewer.finish() {
+                Ok(done) => self.written.push(Written { kind: "viewer", target, frames: done.frames, problem: None }),
+                Err(e) => self.written.push(Written { kind: "viewer", target, frames: e.frames(), problem: Some(e.to_string()) }),
+            }
+        }
+    }
+}
+
+impl Observer for OutputSet<'_> {
+    fn observe(&mut self, sample: &Sample<'_>) -> Flow {
+        self.evaluator.evaluate(&self.plan, sample);
+        let frame = &self.evaluator.frame;
+        self.tracker.follow(&self.plan, sample, frame);
+        #[cfg(feature = "hdf5")]
+        if let Some(results) = &mut self.results
+            && let Err(error) = results.write(&self.plan, sample, frame)
+        {
+            let (target, frames) = (results.path().display().to_string(), results.rows());
+            self.written.push(Written { kind: "results", target, frames, problem: Some(error.to_string()) });
+            self.results = None;
+        }
+        #[cfg(feature = "rerun")]
+        if let Some(viewer) = &mut self.viewer {
+            viewer.send(sample, frame, &self.tracker.events);
+        }
+        Flow::Continue
+    }
+}

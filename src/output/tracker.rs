@@ -1,0 +1,250 @@
+//! Peaks, limits and error figures, followed over the output times.
+
+use super::evaluation::Named;
+use super::frame::OutputFrame;
+use super::plan::OutputPlan;
+use super::report::{BodyPeak, ErrorFigures, Exceedance, HingePeak, Peaks};
+use crate::dynamics::energy::Momentum;
+use crate::integrate::Sample;
+use crate::model::{HingeKind, System};
+use crate::spatial::shift::{angular, linear};
+
+/// Something an output time made known.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Event {
+    /// A limit is exceeded from now on.
+    Exceeded(Exceedance),
+    /// A value is back within its limit.
+    Recovered(Exceedance),
+}
+
+impl Event {
+    /// The event as one line.
+    #[must_use]
+    pub fn text(&self) -> String {
+        let (Self::Exceeded(e) | Self::Recovered(e)) = self;
+        let Exceedance { kind, name, quantity, unit, limit, peak, .. } = e;
+        let quantity = quantity.replace('_', " ");
+        match self {
+            Self::Exceeded(_) => format!("{kind} \"{name}\": {quantity} {peak:.4e} {unit} exceeds its limit {limit:.4e} {unit}"),
+            Self::Recovered(_) => format!("{kind} \"{name}\": {quantity} back within {limit:.4e} {unit} after a peak of {peak:.4e} {unit}"),
+        }
+    }
+}
+
+/// What a watched value is, and the stay above its limit that is open, if one is.
+#[derive(Debug, Clone)]
+struct Watch {
+    source: Source,
+    kind: &'static str,
+    name: String,
+    quantity: &'static str,
+    unit: &'static str,
+    limit: f64,
+    open: Option<usize>,
+}
+
+/// Index into the frame's loads or stresses.
+#[derive(Debug, Clone, Copy)]
+enum Source {
+    Moment(usize),
+    Force(usize),
+    Stress(usize),
+}
+
+impl Source {
+    fn value(self, frame: &OutputFrame) -> f64 {
+        match self {
+            Self::Moment(i) => angular(&frame.loads[i]).norm(),
+            Self::Force(i) => linear(&frame.loads[i]).norm(),
+            Self::Stress(i) => frame.stress[i].value,
+        }
+    }
+}
+
+/// Follows a run over its output times.
+#[derive(Debug, Clone)]
+pub struct Tracker {
+    hinges: Vec<(String, HingePeak)>,
+    bodies: Vec<(usize, String, BodyPeak)>,
+    watches: Vec<Watch>,
+    exceedances: Vec<Exceedance>,
+    /// Events of the last output time.
+    pub events: Vec<Event>,
+    start: Option<Start>,
+    isolated: bool,
+    total_mass: f64,
+    energy_error: f64,
+    largest_kinetic: f64,
+    largest_change: f64,
+    linear_drift: f64,
+    angular_drift: f64,
+    span: f64,
+    audit: Option<f64>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Start {
+    energy: f64,
+    stored: f64,
+    momentum: Momentum,
+}
+
+impl Tracker {
+    /// A tracker of what `plan` asks of `system`.
+    #[must_use]
+    pub fn new(system: &System, plan: &OutputPlan) -> Self {
+        let loaded = plan.loaded_hinges();
+        let hinges = loaded.iter().map(|&k| (system.bodies[k].hinge.name.clone(), HingePeak::default())).collect();
+        let stressed = plan.surfaces.iter().enumerate().filter(|(_, s)| s.stress);
+        let bodies = stressed.map(|(i, s)| (i, system.bodies[s.body].name.clone(), BodyPeak::default())).collect();
+        let mut watches = Vec::new();
+        let mut watch = |source, kind, name: &str, quantity, unit, limit: Option<f64>| {
+            if let Some(limit) = limit {
+                watches.push(Watch { source, kind, name: name.to_owned(), quantity, unit, limit, open: None });
+            }
+        };
+        for (i, &body) in loaded.iter().enumerate() {
+            let (name, (moment, force)) = (&system.bodies[body].hinge.name, plan.hinge_limits(body));
+            watch(Source::Moment(i), "hinge", name, "moment", "N m", moment);
+            watch(Source::Force(i), "hinge", name, "force", "N", force);
+        }
+        for (i, surface) in plan.surfaces.iter().enumerate().filter(|(_, s)| s.stress) {
+            watch(Source::Stress(i), "body", &system.bodies[surface.body].name, "von_mises", "Pa", plan.stress_limit(surface.body));
+        }
+        Self {
+            hinges,
+            bodies,
+            watches,
+            exceedances: Vec::new(),
+            events: Vec::new(),
+            start: None,
+            isolated: is_isolated(system),
+            total_mass: system.bodies.iter().map(crate::model::Body::mass).sum(),
+            energy_error: 0.0,
+            largest_kinetic: 0.0,
+            largest_change: 0.0,
+            linear_drift: 0.0,
+            angular_drift: 0.0,
+            span: 0.0,
+            audit: None,
+        }
+    }
+
+    /// Takes in one output time.
+    pub fn follow(&mut self, plan: &OutputPlan, sample: &Sample<'_>, frame: &OutputFrame) {
+        let time = sample.state.time;
+        for ((_, peak), load) in self.hinges.iter_mut().zip(&frame.loads) {
+            let (moment, force) = (angular(load).norm(), linear(load).norm());
+            if moment > peak.moment {
+                (peak.moment, peak.moment_time_s) = (moment, time);
+            }
+            if force > peak.force {
+                (peak.force, peak.force_time_s) = (force, time);
+            }
+            peak.time_s = if peak.moment > 0.0 { peak.moment_time_s } else { peak.force_time_s };
+        }
+        for (index, _, peak) in &mut self.bodies {
+            let found = frame.stress[*index];
+            if found.value > peak.von_mises {
+                let position = plan.surfaces[*index].surface.points.get(found.node).copied().unwrap_or_default();
+                *peak = BodyPeak { von_mises: found.value, time_s: time, node: found.node, position };
+            }
+        }
+        self.watch_limits(time, frame);
+        self.follow_balances(sample, frame);
+        if let Some(audit) = frame.audit {
+            self.audit = Some(self.audit.unwrap_or(0.0).max(audit.load));
+        }
+    }
+
+    fn watch_limits(&mut self, time: f64, frame: &OutputFrame) {
+        self.events.clear();
+        for watch in &mut self.watches {
+            let value = watch.source.value(frame);
+            match watch.open {
+                None if value > watch.limit => {
+                    let Watch { kind, quantity, unit, limit, .. } = *watch;
+                    let stay =
+                        Exceedance { kind, name: watch.name.clone(), quantity, unit, limit, peak: value, start_s: time, end_s: None };
+                    self.events.push(Event::Exceeded(stay.clone()));
+                    watch.open = Some(self.exceedances.len());
+                    self.exceedances.push(stay);
+                }
+                Some(open) if value > watch.limit => self.exceedances[open].peak = self.exceedances[open].peak.max(value),
+                Some(open) => {
+                    self.exceedances[open].end_s = Some(time);
+                    self.events.push(Event::Recovered(self.exceedances[open].clone()));
+                    watch.open = None;
+                }
+                None => {}
+            }
+        }
+    }
+
+    fn follow_balances(&mut self, sample: &Sample<'_>, frame: &OutputFrame) {
+        let (energy, momentum) = (frame.energy, frame.momentum);
+        let stored = energy.strain + energy.potential;
+        let start = *self.start.get_or_insert(Start { energy: energy.total() - sample.work, stored, momentum });
+        self.energy_error = self.energy_error.max((energy.total() - start.energy - sample.work).abs());
+        self.largest_kinetic = self.largest_kinetic.max(energy.kinetic);
+        self.largest_change = self.largest_change.max((stored - start.stored).abs()).max(sample.work.abs());
+        self.linear_drift = self.linear_drift.max((momentum.linear - start.momentum.linear).norm());
+        self.angular_drift = self.angular_drift.max((momentum.angular - start.momentum.angular).norm());
+        let reach = frame.frames.iter().map(|f| f.position.norm()).fold(0.0, f64::max);
+        self.span = self.span.max(reach);
+    }
+
+    /// Peaks so far, in the order in which the scene defines hinges and bodies.
+    #[must_use]
+    pub fn peaks(&self, system: &System) -> Peaks {
+        let in_order = || system.definition_order.iter().map(|&k| &system.bodies[k]);
+        let hinges = in_order().filter_map(|b| self.hinges.iter().find(|(name, _)| *name == b.hinge.name)).cloned();
+        let bodies = in_order().filter_map(|b| self.bodies.iter().find(|(_, name, _)| *name == b.name));
+        Peaks { hinges: hinges.collect(), bodies: bodies.map(|(_, name, peak)| (name.clone(), *peak)).collect::<Named<_>>() }
+    }
+
+    /// Stays above limits so far.
+    #[must_use]
+    pub fn exceedances(&self) -> &[Exceedance] {
+        &self.exceedances
+    }
+
+    /// Error figures so far; `local` is that of the step control.
+    #[must_use]
+    pub fn errors(&self, local: Option<f64>) -> ErrorFigures {
+        // a system that never moves is measured against the energy that came and went
+        let scale = if self.largest_kinetic > 0.0 { self.largest_kinetic } else { self.largest_change };
+        ErrorFigures {
+            energy: ratio(self.energy_error, scale),
+            momentum: self.isolated.then(|| self.momentum_error()),
+            audit: self.audit,
+            closure: None,
+            local,
+        }
+    }
+
+    /// Drift relative to `sqrt(2 m T)`, the momentum that the largest kinetic energy allows, and for the angular part times the reach.
+    fn momentum_error(&self) -> f64 {
+        let allowed = (2.0 * self.total_mass * self.largest_kinetic).sqrt();
+        let start = self.start.map_or(0.0, |s| s.momentum.angular.norm());
+        ratio(self.linear_drift, allowed).max(ratio(self.angular_drift, start.max(allowed * self.span)))
+    }
+}
+
+fn ratio(error: f64, scale: f64) -> f64 {
+    if scale > 0.0 { error / scale } else { error }
+}
+
+/// True if nothing outside acts on the system: it floats freely, without gravity and without external loads.
+fn is_isolated(system: &System) -> bool {
+    let floats = system.bodies.iter().filter(|b| b.parent.is_none()).all(|b| {
+        let hinge = &b.hinge;
+        matches!(hinge.kind, HingeKind::Free)
+            && hinge.stiffness.is_empty()
+            && hinge.damping.is_empty()
+            && hinge.torque.is_none()
+            && hinge.motion.is_none()
+    });
+    floats && system.gravity.norm() == 0.0 && system.loads.is_empty()
+}
