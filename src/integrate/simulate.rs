@@ -212,6 +212,7 @@ impl Run<'_, '_> {
                     if self.chart.base.time + 4.0 * f64::EPSILON * stop.abs() >= stop {
                         // rounding of t + h must not leave a step of a few ulps
                         self.chart.base.time = stop;
+                        self.chart.clock_rest = 0.0;
                     }
                     flow
                 });
@@ -235,7 +236,7 @@ impl Run<'_, '_> {
     fn advance(&mut self, stepper: &mut dyn Stepper, stop: f64) -> Result<f64, RunFailure> {
         loop {
             let time = self.chart.base.time;
-            let left = stop - time;
+            let left = (stop - time) - self.chart.clock_rest;
             // what is left is taken at once, or halved rather than leave a sliver
             let step = if left <= self.step * (1.0 + 1e-9) {
                 left
