@@ -79,11 +79,26 @@ pub enum DynamicsError {
         scale: f64,
     },
     /// Modes that carry more mass than the body has, seen from its inboard hinge.
-    #[error("body \"{body}\": its modes, held at the inboard hinge, have no positive definite mass; check the modal file with `pliant check`")]
+    #[error(
+        "body \"{body}\": its modes, held at the inboard hinge, have no positive definite mass; check the modal file with `pliant check`"
+    )]
     SingularModes {
         /// Name of the body.
         body: String,
     },
+}
+
+impl DynamicsError {
+    /// True if the numbers themselves broke down, as in a motion that diverges: an inertia that is negative beyond rounding or not a
+    /// number belongs to no model.
+    #[must_use]
+    pub fn is_breakdown(&self) -> bool {
+        match self {
+            // half of the digits lost is beyond rounding
+            Self::SingularHinge { inertia, scale, .. } => !(inertia.is_finite() && scale.is_finite() && *inertia >= -1e-8 * scale.abs()),
+            Self::SingularModes { .. } => false,
+        }
+    }
 }
 
 /// Everything an evaluation writes, allocated once per system.

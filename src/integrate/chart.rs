@@ -13,6 +13,8 @@ pub struct Chart<'a> {
     pub system: &'a System,
     /// State at the step's start.
     pub base: State,
+    /// What rounding has left out of `base.time` (s): the step starts at the sum of the two.
+    pub clock_rest: f64,
     /// Work done up to the step's start (J).
     pub work: f64,
     /// Evaluations so far.
@@ -26,7 +28,7 @@ impl<'a> Chart<'a> {
     /// A chart at `start`.
     #[must_use]
     pub fn new(system: &'a System, start: &State) -> Self {
-        Self { system, base: start.clone(), work: 0.0, evaluations: 0, workspace: Workspace::new(system), state: start.clone() }
+        Self { system, base: start.clone(), clock_rest: 0.0, work: 0.0, evaluations: 0, workspace: Workspace::new(system), state: start.clone() }
     }
 
     /// Number of increments: hinge rates and modes.
@@ -108,8 +110,13 @@ impl<'a> Chart<'a> {
         Ok(())
     }
 
-    /// Moves the base to the state that y stands for at `time`, and the rate of y to the new chart's.
-    pub fn rebase(&mut self, time: f64, y: &[f64], rate: &mut [f64]) {
+    /// Moves the base to the state that y stands for `h` (s) later, and the rate of y to the new chart's.
+    ///
+    /// The clock is a compensated sum: equal steps round alike, and a million of them would put it off by a million half ulps.
+    pub fn rebase(&mut self, h: f64, y: &[f64], rate: &mut [f64]) {
+        let step = h + self.clock_rest;
+        let time = self.base.time + step;
+        self.clock_rest = step - (time - self.base.time);
         let mut state = std::mem::replace(&mut self.state, State { time, position: vec![], velocity: vec![], modal_position: vec![], modal_velocity: vec![] });
         self.state_of(time, y, &mut state);
         std::mem::swap(&mut self.base, &mut state);

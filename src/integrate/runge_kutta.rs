@@ -105,7 +105,7 @@ impl Stepper for RungeKutta {
 
     fn accept(&mut self, chart: &mut Chart<'_>) {
         let last = self.k.len() - 1;
-        chart.rebase(chart.base.time + self.h, &self.y1, &mut self.k[last]);
+        chart.rebase(self.h, &self.y1, &mut self.k[last]);
         // the rate at the end of this step is the first rate of the next
         if let Some((last, rest)) = self.k.split_last_mut() {
             rest[0].copy_from_slice(last);

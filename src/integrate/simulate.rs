@@ -3,8 +3,8 @@
 use super::chart::Chart;
 use super::observer::{Flow, Observer, Sample};
 use super::runge_kutta::RungeKutta;
-use super::step_control::{Controller, Tolerance};
 use super::stability::{fastest_mode, stable_step};
+use super::step_control::{Controller, Tolerance};
 use super::tableau::Tableau;
 use super::{Stepper, tableau};
 use crate::dynamics::{DynamicsError, Workspace, forward_dynamics};
@@ -64,7 +64,9 @@ pub enum RunFailure {
         remedy: &'static str,
     },
     /// A step that became too small to advance time.
-    #[error("at t = {time} s the step fell to {step:e} s, fastest motion in {place}; loosen relative_tolerance or look for a discontinuity there")]
+    #[error(
+        "at t = {time} s the step fell to {step:e} s, fastest motion in {place}; loosen relative_tolerance or look for a discontinuity there"
+    )]
     StepUnderflow {
         /// s.
         time: f64,
@@ -212,6 +214,7 @@ impl Run<'_, '_> {
                     if self.chart.base.time + 4.0 * f64::EPSILON * stop.abs() >= stop {
                         // rounding of t + h must not leave a step of a few ulps
                         self.chart.base.time = stop;
+                        self.chart.clock_rest = 0.0;
                     }
                     flow
                 });
@@ -235,7 +238,7 @@ impl Run<'_, '_> {
     fn advance(&mut self, stepper: &mut dyn Stepper, stop: f64) -> Result<f64, RunFailure> {
         loop {
             let time = self.chart.base.time;
-            let left = stop - time;
+            let left = (stop - time) - self.chart.clock_rest;
             // what is left is taken at once, or halved rather than leave a sliver
             let step = if left <= self.step * (1.0 + 1e-9) {
                 left
@@ -255,11 +258,21 @@ impl Run<'_, '_> {
             }
             let attempted = stepper.attempt(self.chart, step);
             let Some(controller) = &mut self.controller else {
-                attempted.map_err(|source| RunFailure::Dynamics { time, source })?;
-                stepper.interpolate(self.chart, 1.0, &mut self.sampled);
-                if !self.sampled.is_finite() {
+                let diverged = match attempted {
+                    Ok(_) => {
+                        stepper.interpolate(self.chart, 1.0, &mut self.sampled);
+                        !self.sampled.is_finite()
+                    }
+                    Err(source) if source.is_breakdown() || is_torn_apart(self.chart) => true,
+                    Err(source) => return Err(RunFailure::Dynamics { time, source }),
+                };
+                if diverged {
                     let place = fastest_place(self.chart);
-                    return Err(RunFailure::NotFinite { time, place, remedy: "take a smaller step, fewer modes or an error-controlled integrator" });
+                    return Err(RunFailure::NotFinite {
+                        time,
+                        place,
+                        remedy: "take a smaller step, fewer modes or an error-controlled integrator",
+                    });
                 }
                 return Ok(step);
             };
@@ -306,7 +319,8 @@ impl Run<'_, '_> {
             self.sampled.time = at;
             self.sampled.apply_prescribed(self.chart.system);
             self.evaluations += 1;
-            forward_dynamics(self.chart.system, &self.sampled, &mut self.output).map_err(|source| RunFailure::Dynamics { time: at, source })?;
+            forward_dynamics(self.chart.system, &self.sampled, &mut self.output)
+                .map_err(|source| RunFailure::Dynamics { time: at, source })?;
             let sample = Sample { system: self.chart.system, state: &self.sampled, workspace: &self.output, work, steps: self.steps };
             for observer in observers.iter_mut() {
                 if observer.observe(&sample) == Flow::Stop {
@@ -316,6 +330,17 @@ impl Run<'_, '_> {
         }
         Ok(flow)
     }
+}
+
+/// True if the last evaluation saw a body deformed to a thousand times its size (a million in inertia): only a diverging motion does that.
+fn is_torn_apart(chart: &Chart<'_>) -> bool {
+    chart.system.bodies.iter().zip(&chart.workspace.pose.bodies).any(|(body, pose)| match (body.flexible(), pose.flexible) {
+        (Some(flexible), Some(index)) => {
+            let undeformed = 2.0 * flexible.integrals.second_moment.trace();
+            chart.workspace.pose.flexible[index].inertia.inertia.trace() > 1e6 * undeformed
+        }
+        _ => false,
+    })
 }
 
 /// The hinge or mode that moves fastest, for messages.

@@ -166,6 +166,7 @@ impl Definition {
         if self.bodies.is_empty() {
             return Err(ModelError::Empty);
         }
+        finite(self.gravity.as_slice(), place("system", 0, "gravity"), "scene")?;
         let numbers = self.bodies.iter().enumerate().map(|(i, b)| (b.name.as_str(), i)).collect();
         let builder = Builder { definition: self, numbers };
         builder.check_names()?;
@@ -309,6 +310,7 @@ impl Builder<'_> {
                     });
                 }
                 check_rigid(old, definition, *mass, inertia)?;
+                finite(center_of_mass.as_slice(), place("body", old, "center_of_mass"), &definition.name)?;
                 let (r, x) = child_frame;
                 let c = r.tr_mul(&(center_of_mass - x));
                 let about_o = r.transpose() * inertia * r + (Matrix3::from_diagonal_element(c.norm_squared()) - c * c.transpose()) * *mass;
@@ -339,6 +341,7 @@ impl Builder<'_> {
                         expected: format!("{n}, one per retained mode"),
                     });
                 }
+                finite(given, place("body", old, key), &definition.name)?;
                 into.extend(given);
                 into.extend(std::iter::repeat_n(0.0, n - given.len()));
             }
@@ -398,6 +401,7 @@ impl Builder<'_> {
     }
 
     fn frame(&self, h: usize, key: &'static str, frame: &Frame) -> Result<(Matrix3<f64>, Vector3<f64>), ModelError> {
+        finite(frame.position.as_slice(), place("hinge", h, key), &self.definition.hinges[h].name)?;
         let q = unit(&frame.quaternion, place("hinge", h, key), &self.definition.hinges[h].name)?;
         Ok((rotation::matrix_of_quaternion(&q), frame.position))
     }
@@ -449,6 +453,7 @@ impl Builder<'_> {
                     expected: format!("{rates}, one per rate of a {} hinge", kind.name()),
                 });
             }
+            finite(&function.parameters(), place("hinge", h, key), &given.name)?;
         }
         if given.motion.is_some() {
             if kind.has_quaternion() || rates == 0 {
@@ -487,6 +492,7 @@ impl Builder<'_> {
 
     /// One value for all, one per rate, or none (empty if `sparse`, else zeros).
     fn list(&self, h: usize, key: &'static str, given: &[f64], rates: usize, sparse: bool) -> Result<Vec<f64>, ModelError> {
+        finite(given, place("hinge", h, key), &self.definition.hinges[h].name)?;
         match given.len() {
             0 if sparse => Ok(Vec::new()),
             0 => Ok(vec![0.0; rates]),
@@ -515,6 +521,7 @@ impl Builder<'_> {
                 expected: format!("{} for a {} hinge", hinge.kind.position_count(), hinge.kind.name()),
             });
         }
+        finite(given, at.clone(), &hinge.name)?;
         let mut position = given.clone();
         if hinge.kind.has_quaternion() {
             let start = position.len() - 4;
@@ -533,6 +540,9 @@ impl Builder<'_> {
             if found != 3 {
                 return Err(ModelError::WrongLength { place: place("load", index, key), item, found, expected: "3 components".into() });
             }
+            if let Some(function) = function {
+                finite(&function.parameters(), place("load", index, key), &item)?;
+            }
         }
         let body = system.definition_order[number];
         let point = match (&given.point, &self.definition.bodies[number].kind) {
@@ -541,6 +551,7 @@ impl Builder<'_> {
                 LoadPoint::Interface(Attachment::on_interface(found, Vector3::zeros(), Matrix3::identity()))
             }
             (PointDefinition::Point(point), BodyDefinitionKind::Rigid { .. }) => {
+                finite(point.as_slice(), place("load", index, "point"), &item)?;
                 LoadPoint::Rigid(system.bodies[body].frame_position + system.bodies[body].frame_rotation * point)
             }
             (PointDefinition::Node { position, mode_shape, rotations }, BodyDefinitionKind::Flexible(_)) => {
@@ -572,6 +583,14 @@ impl Builder<'_> {
             }
         };
         Ok(Load { body, point, force: given.force.clone(), moment: given.moment.clone(), axes: given.axes })
+    }
+}
+
+/// Refuses what no definition means: NaN and infinities.
+fn finite(values: &[f64], place: Place, item: &str) -> Result<(), ModelError> {
+    match values.iter().find(|x| !x.is_finite()) {
+        None => Ok(()),
+        Some(&found) => Err(ModelError::BadNumber { place, item: item.to_owned(), found, expected: "finite" }),
     }
 }
 
@@ -646,6 +665,7 @@ fn hinge_kind(h: usize, given: &HingeDefinition) -> Result<HingeKind, ModelError
     if given.pitch.is_some() != (given.kind == "screw") {
         return Err(bad("pitch", "pitch belongs to a screw hinge, and a screw needs one".into(), "give pitch = x in m/rad for kind = \"screw\" only"));
     }
+    finite(given.pitch.as_slice(), place("hinge", h, "pitch"), &given.name)?;
     let axes: Vec<_> = given.axes.iter().map(Vector3::normalize).collect();
     Ok(match given.kind.as_str() {
         "fixed" => HingeKind::Fixed,

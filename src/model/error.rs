@@ -6,7 +6,7 @@ use thiserror::Error;
 /// Part of a definition that an error points at: its list, its place in the list (0-based) and the key.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Place {
-    /// "body", "hinge" or "load".
+    /// "body", "hinge" or "load"; "system" for what belongs to none.
     pub section: &'static str,
     /// Index in that list.
     pub index: usize,

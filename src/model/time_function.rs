@@ -183,6 +183,18 @@ impl TimeFunction {
         }
     }
 
+    /// Every number the function was given, for checks.
+    #[must_use]
+    pub fn parameters(&self) -> Vec<f64> {
+        match self {
+            Self::Constant(x) => x.clone(),
+            Self::Table(table) => [&*table.times, &*table.values].concat(),
+            Self::Sine { amplitude, frequency_hz, phase } => [&**amplitude, &[*frequency_hz, *phase]].concat(),
+            Self::SmoothStep { from, to, start, end } => [&**from, to, &[*start, *end]].concat(),
+            Self::Sum(terms) => terms.iter().flat_map(Self::parameters).collect(),
+        }
+    }
+
     /// Value of one component at time `t` (s).
     #[must_use]
     pub fn value(&self, t: f64, component: usize) -> f64 {

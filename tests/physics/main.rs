@@ -3,4 +3,8 @@
 #[path = "../support/mod.rs"]
 mod support;
 
+mod extremes;
+mod first_principles;
 mod identities;
+mod nodal_sums;
+mod published;

@@ -2,6 +2,7 @@
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
 pub mod lumped;
+pub mod scenes;
 pub mod trees;
 
 /// Asserts that two slices agree within `allowed` of the largest entry of the expected one.
