@@ -1,6 +1,6 @@
 //! Arguments as clap parses them; no validation beyond syntax.
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 
 /// Flexible multibody dynamics with the six-component load at every hinge.
@@ -16,6 +16,8 @@ pub struct Arguments {
 /// The subcommands.
 #[derive(Debug, Subcommand)]
 pub enum Command {
+    /// Simulate a scene: motion, load at every hinge, stress; without SCENE the built-in hub with two panels
+    Run(RunArguments),
     /// Evaluate a scene once, at its initial state: accelerations, hinge loads, energies
     Eval(EvalArguments),
     /// Check scenes and modal files; a modal file gets its health report, one row per rule
@@ -77,6 +79,54 @@ pub struct EvalArguments {
     #[command(flatten)]
     pub overrides: SceneArguments,
     /// Print one JSON object instead of tables; every number reads back to the same f64
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Where the picture goes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Viewer {
+    /// No picture
+    None,
+    /// A recording on disk, see --rrd
+    Save,
+    /// A viewer that pliant starts (`rerun` on PATH or in .venv/bin)
+    Spawn,
+    /// A viewer that is already listening, see --url
+    Connect,
+    /// A page that pliant serves to a browser, see --port
+    Web,
+}
+
+/// Arguments of `pliant run`.
+#[derive(Debug, Args)]
+#[command(help_expected = true)]
+pub struct RunArguments {
+    /// The scene (.toml); the built-in example if left out
+    #[arg(value_name = "SCENE")]
+    pub scene: Option<PathBuf>,
+    /// Show the motion [default: save if --rrd is given or for the built-in example, else none]
+    #[arg(long, value_name = "HOW", value_enum)]
+    pub viewer: Option<Viewer>,
+    /// Recording to write with --viewer save [default: the scene's name with .rrd, here]
+    #[arg(long, value_name = "FILE")]
+    pub rrd: Option<PathBuf>,
+    /// Address of the viewer with --viewer connect
+    #[arg(long, value_name = "URL", default_value = "rerun+http://127.0.0.1:9876/proxy")]
+    pub url: String,
+    /// Port of the page with --viewer web; the data uses the port after it
+    #[arg(long, value_name = "PORT", default_value_t = 9090)]
+    pub port: u16,
+    /// Results file to write (HDF5)
+    #[arg(long, value_name = "FILE.h5")]
+    pub out: Option<PathBuf>,
+    /// Simulated time (s) instead of the scene's
+    #[arg(long, value_name = "S")]
+    pub duration: Option<f64>,
+    /// Changes to the scene
+    #[command(flatten)]
+    pub overrides: SceneArguments,
+    /// Print the closing report as one JSON object
     #[arg(long)]
     pub json: bool,
 }

@@ -14,7 +14,6 @@ pub enum Failure {
     /// The input is at fault; one message for each fault.
     Input(Vec<String>),
     /// The run stopped early; what was computed is kept.
-    #[allow(dead_code, reason = "the commands that simulate return it")]
     Stopped(String),
     /// The output cannot be written.
     Output(io::Error),

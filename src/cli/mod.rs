@@ -11,6 +11,8 @@ mod failure;
 #[cfg(feature = "hdf5")]
 mod modes;
 mod report;
+mod run;
+mod run_report;
 
 use args::{Arguments, Command};
 use clap::{CommandFactory, Parser};
@@ -44,6 +46,7 @@ pub fn main() -> ExitCode {
 fn run(arguments: Arguments, output: &mut dyn Write) -> Result<(), Failure> {
     match arguments.command {
         None => Ok(write!(output, "{}", Arguments::command().render_help())?),
+        Some(Command::Run(arguments)) => run::run(&arguments, output),
         Some(Command::Eval(arguments)) => eval::run(&arguments, output),
         Some(Command::Check(arguments)) => check::run(&arguments, output),
         #[cfg(feature = "hdf5")]

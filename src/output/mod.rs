@@ -14,6 +14,8 @@ pub mod report;
 pub mod rerun;
 #[cfg(feature = "hdf5")]
 pub mod results;
+#[cfg(feature = "hdf5")]
+pub mod scene_plan;
 pub mod set;
 pub mod surface;
 pub mod tracker;

@@ -1,5 +1,7 @@
 //! What a run is asked to put out. Everything not named here is not evaluated.
 
+pub use crate::scene::Monitor;
+
 use super::surface::Surface;
 use crate::model::System;
 use std::sync::Arc;
@@ -36,27 +38,6 @@ pub struct BodyBox {
     pub size: [f64; 3],
     /// Centre in body axes (m).
     pub center: [f64; 3],
-}
-
-/// Limits to watch at every output time.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Monitor {
-    /// Magnitudes of the load at the inboard hinge of a body.
-    Hinge {
-        /// Index of the body that the hinge carries.
-        body: usize,
-        /// N m.
-        moment_limit: Option<f64>,
-        /// N.
-        force_limit: Option<f64>,
-    },
-    /// Von Mises stress of a flexible body.
-    Body {
-        /// Index of the body.
-        body: usize,
-        /// Pa.
-        stress_limit: Option<f64>,
-    },
 }
 
 /// Everything that a run puts out.

@@ -26,13 +26,25 @@ pub struct Overrides {
     pub duration: Option<f64>,
 }
 
-/// A limit that a run watches. Limits are on magnitudes.
+/// Limits to watch at every output time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Monitor {
-    /// Load at the hinge of a body (N m, N).
-    Hinge { body: usize, moment_limit: Option<f64>, force_limit: Option<f64> },
-    /// von Mises stress of a body (Pa).
-    Body { body: usize, stress_limit: Option<f64> },
+    /// Magnitudes of the load at the inboard hinge of a body.
+    Hinge {
+        /// Index of the body that the hinge carries.
+        body: usize,
+        /// N m.
+        moment_limit: Option<f64>,
+        /// N.
+        force_limit: Option<f64>,
+    },
+    /// Von Mises stress of a flexible body.
+    Body {
+        /// Index of the body.
+        body: usize,
+        /// Pa.
+        stress_limit: Option<f64>,
+    },
 }
 
 /// A scene ready to run.

@@ -1,0 +1,248 @@
+//! `pliant run`: simulate a scene and report.
+
+use super::args::{RunArguments, Viewer};
+use super::failure::{Failure, with_causes};
+use super::report::number;
+use super::run_report;
+use crate::integrate::simulate::Method;
+use crate::integrate::stability::{fastest_mode, stable_step};
+use crate::integrate::{Flow, Observer, Outcome, Sample, Settings, simulate};
+use crate::output::{OutputPlan, OutputSet};
+use crate::scene::{Overrides, Scene, SceneError, assemble};
+use indicatif::{ProgressBar, ProgressStyle};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+/// The built-in example, laid out as in the repository.
+const EXAMPLE: [(&str, &[u8]); 2] = [
+    ("examples/02_hub_two_panels/scene.toml", include_bytes!("../../examples/02_hub_two_panels/scene.toml")),
+    ("modes/panel_cantilever.h5", include_bytes!("../../modes/panel_cantilever.h5")),
+];
+
+/// Simulates the scene and prints the closing report.
+pub fn run(arguments: &RunArguments, output: &mut dyn Write) -> Result<(), Failure> {
+    let mut overrides = Overrides::from(&arguments.overrides);
+    overrides.duration = arguments.duration;
+    // the folder must live as long as the modal files in it are read
+    let (scene, _folder) = match &arguments.scene {
+        Some(path) => (assemble::load(path, &overrides)?, None),
+        None => built_in(&overrides).map(|(scene, folder)| (scene, Some(folder)))?,
+    };
+    let Some(duration) = scene.duration else {
+        let message = "the scene has no [simulation] duration; add one (s) or give --duration".to_owned();
+        return Err(Failure::input(format!("{}: {message}", scene.source.path.display())));
+    };
+    let viewer = arguments.viewer.unwrap_or(if arguments.rrd.is_some() || arguments.scene.is_none() { Viewer::Save } else { Viewer::None });
+    let settings = Settings { duration, method: scene.method, rate_hz: scene.rate_hz };
+
+    let plan = plan(&scene, viewer != Viewer::None)?;
+    let mut outputs = OutputSet::new(&scene.system, plan).map_err(|e| Failure::input(with_causes(&e)))?;
+    open_results(arguments, &mut outputs)?;
+    open_viewer(arguments, viewer, &scene, &mut outputs)?;
+    let left_out = left_out(arguments, viewer, &scene);
+    announce(&scene, &settings, &left_out);
+
+    let mut progress = Progress::new(&settings);
+    let started = Instant::now();
+    let summary = simulate(&scene.system, &scene.state, &settings, &mut [&mut outputs, &mut progress]);
+    let wall = started.elapsed();
+    progress.bar.finish_and_clear();
+    let report = outputs.finish(&summary, scene.method.tableau().name, wall, left_out);
+
+    if arguments.json {
+        let text = serde_json::to_string_pretty(&report).map_err(|e| Failure::Output(e.into()))?;
+        writeln!(output, "{text}")?;
+    } else {
+        run_report::write(&scene.name, &report, output)?;
+    }
+    output.flush()?;
+    #[cfg(feature = "rerun")]
+    if viewer == Viewer::Web && summary.outcome == Outcome::Completed {
+        wait_for_interrupt(&progress.interrupted, arguments.port);
+    }
+    match &summary.outcome {
+        Outcome::Failed(failure) => return Err(Failure::Stopped(format!("the run stopped early: {failure}; what was computed is kept"))),
+        Outcome::Stopped => return Err(Failure::Stopped(format!("interrupted at t = {} s; what was computed is kept", number(summary.time)))),
+        Outcome::Completed => {}
+    }
+    let problems: Vec<_> = report.files.iter().filter_map(|f| f.problem.as_ref().map(|p| format!("{} {}: {p}", f.kind, f.target))).collect();
+    if problems.is_empty() { Ok(()) } else { Err(Failure::Stopped(problems.join("\nerror: "))) }
+}
+
+/// Unpacks the example into a folder of its own.
+fn built_in(overrides: &Overrides) -> Result<(Scene, tempfile::TempDir), Failure> {
+    let wrap = |path: &Path, source: std::io::Error| SceneError::Read { path: path.to_owned(), source };
+    let folder = tempfile::tempdir().map_err(|e| wrap(&std::env::temp_dir(), e))?;
+    for (name, bytes) in EXAMPLE {
+        let path = folder.path().join(name);
+        if let Some(parent) = path.parent() {
+            std::fs::create_dir_all(parent).map_err(|e| wrap(parent, e))?;
+        }
+        std::fs::write(&path, bytes).map_err(|e| wrap(&path, e))?;
+    }
+    Ok((assemble::load(&folder.path().join(EXAMPLE[0].0), overrides)?, folder))
+}
+
+#[cfg(feature = "hdf5")]
+fn plan(scene: &Scene, picture: bool) -> Result<OutputPlan, Failure> {
+    Ok(crate::output::scene_plan::plan(scene, picture)?)
+}
+
+#[cfg(not(feature = "hdf5"))]
+fn plan(scene: &Scene, _picture: bool) -> Result<OutputPlan, Failure> {
+    Ok(OutputPlan {
+        scene_name: scene.name.clone(),
+        scene_text: scene.source.text.clone(),
+        hinges: scene.hinges.clone(),
+        monitors: scene.monitors.clone(),
+        deformation_scale: scene.deformation_scale,
+        audit: scene.audit,
+        ..OutputPlan::default()
+    })
+}
+
+#[cfg(feature = "hdf5")]
+fn open_results(arguments: &RunArguments, outputs: &mut OutputSet<'_>) -> Result<(), Failure> {
+    match &arguments.out {
+        Some(path) => outputs.write_results(path).map_err(|e| Failure::input(with_causes(&e))),
+        None => Ok(()),
+    }
+}
+
+#[cfg(not(feature = "hdf5"))]
+fn open_results(arguments: &RunArguments, _outputs: &mut OutputSet<'_>) -> Result<(), Failure> {
+    match &arguments.out {
+        Some(_) => Err(Failure::input("--out: this build writes no results files; build with the feature \"hdf5\"")),
+        None => Ok(()),
+    }
+}
+
+/// Recording of a scene that names none.
+#[cfg(feature = "rerun")]
+fn default_recording(arguments: &RunArguments) -> PathBuf {
+    let stem = |path: &PathBuf| path.file_stem().map(|s| s.to_string_lossy().into_owned());
+    let named = arguments.scene.as_ref().and_then(|path| match stem(path) {
+        // examples/NAME/scene.toml says more by its folder
+        Some(name) if name == "scene" => path.parent().and_then(Path::file_name).map(|n| n.to_string_lossy().into_owned()).or(Some(name)),
+        other => other,
+    });
+    PathBuf::from(format!("{}.rrd", named.unwrap_or_else(|| "hub_two_panels".into())))
+}
+
+#[cfg(feature = "rerun")]
+fn open_viewer(arguments: &RunArguments, viewer: Viewer, _scene: &Scene, outputs: &mut OutputSet<'_>) -> Result<(), Failure> {
+    use crate::output::ViewerTarget;
+    let target = match viewer {
+        Viewer::None => return Ok(()),
+        Viewer::Save => ViewerTarget::Save(arguments.rrd.clone().unwrap_or_else(|| default_recording(arguments))),
+        Viewer::Spawn => ViewerTarget::Spawn { executable: None },
+        Viewer::Connect => ViewerTarget::Connect { url: arguments.url.clone() },
+        Viewer::Web => ViewerTarget::Web { port: arguments.port, grpc_port: arguments.port.wrapping_add(1) },
+    };
+    outputs.open_viewer(target).map_err(|e| Failure::input(with_causes(&e)))
+}
+
+#[cfg(not(feature = "rerun"))]
+fn open_viewer(arguments: &RunArguments, viewer: Viewer, _scene: &Scene, _outputs: &mut OutputSet<'_>) -> Result<(), Failure> {
+    // the example runs without a picture where there is none to be had
+    let _: Option<PathBuf> = None;
+    match arguments.viewer.or(arguments.rrd.as_ref().map(|_| viewer)) {
+        None | Some(Viewer::None) => Ok(()),
+        Some(_) => Err(Failure::input("--viewer: this build has no viewer stream; build with the feature \"rerun\"")),
+    }
+}
+
+fn left_out(arguments: &RunArguments, viewer: Viewer, scene: &Scene) -> Vec<String> {
+    let mut left_out = scene.left_out.clone();
+    if viewer == Viewer::None {
+        left_out.push("viewer".into());
+    }
+    if arguments.out.is_none() {
+        left_out.push("results file".into());
+    }
+    left_out
+}
+
+/// What is about to run, on standard error.
+fn announce(scene: &Scene, settings: &Settings, left_out: &[String]) {
+    let system = &scene.system;
+    let how = match settings.method {
+        Method::RungeKutta4 { step } => format!("fixed step {} s", number(step)),
+        Method::DormandPrince { tolerance, .. } => format!("relative tolerance {:e}", tolerance.relative),
+    };
+    let mut lines = vec![format!(
+        "{}: {} bodies, {} hinge rates, {} modes; {} s with {}, {how}",
+        scene.name,
+        system.bodies.len(),
+        system.velocity_count,
+        system.modal_count,
+        number(settings.duration),
+        settings.method.tableau().name,
+    )];
+    if let Some(mode) = fastest_mode(system) {
+        let stable = stable_step(&settings.method.tableau(), mode.frequency_hz, mode.damping_ratio);
+        lines.push(format!(
+            "fastest retained mode: mode {} of \"{}\" at {} Hz; stable step {} s",
+            mode.mode,
+            mode.body,
+            number(mode.frequency_hz),
+            number(stable)
+        ));
+        if let Method::RungeKutta4 { step } = settings.method
+            && step > stable
+        {
+            lines.push(format!("warning: the step of {} s is larger than that; the run will leave finite numbers", number(step)));
+        }
+    }
+    lines.push(format!("left out: {}", left_out.join(", ")));
+    let mut sink = std::io::stderr().lock();
+    for line in lines {
+        // nothing is lost if standard error is closed
+        let _ = writeln!(sink, "{line}");
+    }
+}
+
+/// Progress bar and Ctrl-C.
+struct Progress {
+    bar: ProgressBar,
+    interrupted: Arc<AtomicBool>,
+}
+
+/// Ticks of the bar per simulated second.
+const TICKS: f64 = 1000.0;
+
+impl Progress {
+    fn new(settings: &Settings) -> Self {
+        let bar = ProgressBar::new((settings.duration * TICKS) as u64);
+        if let Ok(style) = ProgressStyle::with_template("{wide_bar} {percent} %  {msg}  eta {eta}") {
+            bar.set_style(style);
+        }
+        let interrupted = Arc::new(AtomicBool::new(false));
+        let flag = Arc::clone(&interrupted);
+        // without a handler Ctrl-C ends the process at once, which loses only what is not yet on disk
+        let _ = ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed));
+        Self { bar, interrupted }
+    }
+}
+
+impl Observer for Progress {
+    fn observe(&mut self, sample: &Sample<'_>) -> Flow {
+        self.bar.set_position((sample.state.time * TICKS) as u64);
+        if sample.steps % 64 == 0 {
+            self.bar.set_message(format!("t = {} s, {} steps", number(sample.state.time), sample.steps));
+        }
+        if self.interrupted.load(Ordering::Relaxed) { Flow::Stop } else { Flow::Continue }
+    }
+}
+
+/// Keeps the page served until Ctrl-C.
+#[cfg(feature = "rerun")]
+fn wait_for_interrupt(interrupted: &AtomicBool, port: u16) {
+    let _ = writeln!(std::io::stderr(), "the page at http://127.0.0.1:{port} stays until Ctrl-C");
+    while !interrupted.load(Ordering::Relaxed) {
+        std::thread::sleep(std::time::Duration::from_millis(100));
+    }
+}

@@ -1,0 +1,67 @@
+//! From a scene to the plan of its outputs: surfaces are read here, and only where a picture or a stress figure wants them.
+
+use super::plan::{BodyBox, BodySurface, ModalFileRecord, OutputPlan};
+use super::surface::Surface;
+use crate::io::ModalFileError;
+use crate::model::BodyKind;
+use crate::scene::{Monitor, Scene};
+use std::collections::HashMap;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// The plan of `scene`; with `picture`, surfaces of all flexible bodies are read, else only those whose stress is wanted.
+///
+/// # Errors
+/// If the surface of a modal file cannot be read.
+pub fn plan(scene: &Scene, picture: bool) -> Result<OutputPlan, ModalFileError> {
+    let monitored = |body: usize| scene.monitors.iter().any(|m| matches!(m, Monitor::Body { body: b, .. } if *b == body));
+    let mut shared: HashMap<(PathBuf, Vec<usize>), Arc<Surface>> = HashMap::new();
+    let mut surfaces = Vec::new();
+    let mut modal_files = Vec::new();
+    for (body, selection) in &scene.flexible {
+        modal_files.push(ModalFileRecord {
+            body: scene.system.bodies[*body].name.clone(),
+            path: selection.file.path().display().to_string(),
+            content_sha256: selection.content_sha256.clone(),
+        });
+        let has_stress = selection.file.stress_location()?.is_some();
+        let stress = has_stress && !selection.modes.is_empty() && (scene.stress.contains(body) || monitored(*body));
+        if picture || stress {
+            let key = (selection.file.path().to_owned(), selection.modes.clone());
+            let surface = match shared.get(&key) {
+                Some(surface) => Arc::clone(surface),
+                None => {
+                    let surface = Arc::new(Surface::from(selection.file.read_surface(&selection.modes)?));
+                    shared.insert(key, Arc::clone(&surface));
+                    surface
+                }
+            };
+            surfaces.push(BodySurface { body: *body, surface, stress });
+        }
+    }
+    let box_of = |(k, size): (usize, &Option<[f64; 3]>)| {
+        size.map(|size| {
+            let body = &scene.system.bodies[k];
+            // centred on the mass, as the cuboid of equal inertia would be
+            let center = match &body.kind {
+                BodyKind::Rigid(inertia) if body.mass() > 0.0 => {
+                    let c = nalgebra::Vector3::new(inertia.coupling[(2, 1)], inertia.coupling[(0, 2)], inertia.coupling[(1, 0)]) / body.mass();
+                    body.frame_rotation.tr_mul(&(c - body.frame_position))
+                }
+                _ => nalgebra::Vector3::zeros(),
+            };
+            BodyBox { body: k, size, center: center.into() }
+        })
+    };
+    Ok(OutputPlan {
+        scene_name: scene.name.clone(),
+        scene_text: scene.source.text.clone(),
+        modal_files,
+        hinges: scene.hinges.clone(),
+        surfaces,
+        boxes: scene.boxes.iter().enumerate().filter_map(box_of).collect(),
+        monitors: scene.monitors.clone(),
+        deformation_scale: scene.deformation_scale,
+        audit: scene.audit,
+    })
+}
