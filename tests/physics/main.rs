@@ -3,8 +3,12 @@
 #[path = "../support/mod.rs"]
 mod support;
 
+mod conservation;
+mod convergence;
 mod extremes;
 mod first_principles;
 mod identities;
 mod nodal_sums;
 mod published;
+mod published_flexible;
+mod scaling;

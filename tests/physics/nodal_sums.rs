@@ -136,7 +136,10 @@ fn inertia_orders_zero_and_one_are_the_taylor_truncations() {
                 // exact terms have no error; the others' next power of eta changes the ratio by 1e-3 of their cubic share
                 let exact = fine < 1e3 * f64::EPSILON;
                 let slope = ratio.log2();
-                assert!(exact || slope > f64::from(power) - 0.1, "seed {seed}, {order:?}: {what} shrink as eta^{slope:.3}, expected {power}");
+                assert!(
+                    exact || slope > f64::from(power) - 0.1,
+                    "seed {seed}, {order:?}: {what} shrink as eta^{slope:.3}, expected {power}"
+                );
             }
             let undeformed = at(0.0);
             // at eta = 0 every order is exact but for rounding, and for modal rates, which are zero here

@@ -91,7 +91,8 @@ pub fn exact_beam(modes: usize) -> ModalBody {
     let sigma = |b: f64| (b.sinh() - b.sin()) / (b.cosh() + b.cos());
     let sign = |j: usize| if j.is_multiple_of(2) { 1.0 } else { -1.0 };
     let in_plane = |a: usize, b: usize, x: f64| Matrix3::from_fn(|i, j| if (i, j) == (a, b) { x } else { 0.0 });
-    let tip = beta.iter().enumerate().map(|(j, &b)| nalgebra::Vector6::new(0.0, 0.0, 2.0 * sign(j) * b * sigma(b), 0.0, 2.0 * sign(j), 0.0));
+    let tip =
+        beta.iter().enumerate().map(|(j, &b)| nalgebra::Vector6::new(0.0, 0.0, 2.0 * sign(j) * b * sigma(b), 0.0, 2.0 * sign(j), 0.0));
     let interface = |name: &str, x: f64, mode_shape| Interface {
         name: name.into(),
         position: Vector3::new(x, 0.0, 0.0),

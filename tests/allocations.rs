@@ -1,0 +1,70 @@
+//! An evaluation allocates nothing: counted by the allocator itself, in a binary of its own so that nothing else counts.
+
+mod support;
+
+use nalgebra::Vector6;
+use pliant::dynamics::hinge_load::hinge_loads;
+use pliant::dynamics::{Workspace, forward_dynamics};
+use pliant::model::modal_body::Boundary;
+use std::alloc::{GlobalAlloc, Layout, System as SystemAllocator};
+use std::cell::Cell;
+use support::trees::{KINDS, Recipe, random_tree};
+
+thread_local! {
+    static COUNT: Cell<usize> = const { Cell::new(0) };
+}
+
+struct Counting;
+
+// SAFETY: every call is passed on unchanged; the counter is a plain cell without a destructor
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        COUNT.with(|c| c.set(c.get() + 1));
+        unsafe { SystemAllocator.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        unsafe { SystemAllocator.dealloc(pointer, layout) }
+    }
+
+    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        COUNT.with(|c| c.set(c.get() + 1));
+        unsafe { SystemAllocator.realloc(pointer, layout, size) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+fn count(work: impl FnOnce()) -> usize {
+    let before = COUNT.with(Cell::get);
+    work();
+    COUNT.with(Cell::get) - before
+}
+
+#[test]
+fn the_counter_counts() {
+    assert_eq!(count(|| drop(std::hint::black_box(vec![1.0; 100]))), 1);
+}
+
+#[test]
+fn evaluations_and_hinge_loads_allocate_nothing() {
+    let boundaries = [None, Some(Boundary::Cantilever), Some(Boundary::FreeFree), Some(Boundary::General)];
+    for (i, (base, _, _)) in KINDS.iter().enumerate() {
+        for (j, boundary) in boundaries.into_iter().enumerate() {
+            let recipe = Recipe { bodies: 12, base: Some(base), boundary, prescribed: 0.2, ..Recipe::default() };
+            let (system, mut state) = random_tree((i * 10 + j) as u64, &recipe).build().unwrap();
+            let mut workspace = Workspace::new(&system);
+            let mut loads = vec![Vector6::zeros(); system.bodies.len()];
+            let mut evaluate = || {
+                state.time += 0.01;
+                state.apply_prescribed(&system);
+                forward_dynamics(&system, &state, &mut workspace).unwrap();
+                hinge_loads(&system, &workspace, &mut loads);
+            };
+            evaluate();
+            let allocations = count(|| (0..3).for_each(|_| evaluate()));
+            assert_eq!(allocations, 0, "base {base}, boundary {boundary:?}");
+        }
+    }
+}
