@@ -1,7 +1,9 @@
 //! `pliant check`: every file is checked before the command fails.
 
 use super::args::CheckArguments;
-use super::failure::Failure;
+use super::failure::{Failure, with_causes};
+use crate::output::Evaluation;
+use crate::scene::{Overrides, assemble};
 use std::io::Write;
 use std::path::Path;
 
@@ -25,8 +27,43 @@ fn check_file(file: &Path, output: &mut dyn Write) -> Result<(serde_json::Value,
     let extension = file.extension().map(|e| e.to_string_lossy().to_lowercase());
     match extension.as_deref() {
         Some("h5" | "hdf5") => check_modal_file(file, output),
+        Some("toml") => check_scene(file, output),
         _ => {
-            let message = format!("{}: found no modal file; this version checks modal files (.h5) only, not scenes yet", file.display());
+            let message = format!("{}: neither a scene (.toml) nor a modal file (.h5) by its name; rename it or name another file", file.display());
+            Ok((serde_json::json!({ "file": file.to_string_lossy(), "accepted": false, "messages": [message] }), vec![message]))
+        }
+    }
+}
+
+/// A scene: everything `run` checks before its first step, one evaluation included.
+fn check_scene(file: &Path, output: &mut dyn Write) -> Result<(serde_json::Value, Vec<String>), Failure> {
+    let checked = assemble::load(file, &Overrides::default()).map_err(|e| with_causes(&e)).and_then(|scene| {
+        let evaluation = Evaluation::of(&scene.system, &scene.state).map_err(|e| format!("{}: {}", file.display(), with_causes(&e)))?;
+        Ok((scene, evaluation))
+    });
+    match checked {
+        Ok((scene, evaluation)) => {
+            let system = &scene.system;
+            let counts = (system.bodies.len(), system.velocity_count, system.modal_count, system.loads.len());
+            writeln!(output, "{}: accepted", file.display())?;
+            writeln!(
+                output,
+                "  \"{}\": {} bodies, {} hinge rates, {} modes, {} loads; load audit at the start {:.1e}",
+                scene.name, counts.0, counts.1, counts.2, counts.3, evaluation.audit.load_residual
+            )?;
+            let object = serde_json::json!({
+                "file": file.to_string_lossy(),
+                "accepted": true,
+                "bodies": counts.0,
+                "hinge_rates": counts.1,
+                "modes": counts.2,
+                "loads": counts.3,
+                "messages": [],
+            });
+            Ok((object, Vec::new()))
+        }
+        Err(message) => {
+            writeln!(output, "{}: refused", file.display())?;
             Ok((serde_json::json!({ "file": file.to_string_lossy(), "accepted": false, "messages": [message] }), vec![message]))
         }
     }

@@ -24,6 +24,6 @@ pub use evaluation::Evaluation;
 pub use plan::{BodyBox, BodySurface, ModalFileRecord, Monitor, OutputPlan, PlanError};
 pub use report::RunReport;
 #[cfg(feature = "rerun")]
-pub use rerun::{ViewerError, ViewerTarget};
+pub use self::rerun::{ViewerError, ViewerTarget};
 pub use set::OutputSet;
 pub use surface::Surface;

@@ -1,0 +1,251 @@
+//! `run`, `eval` and `check` on scenes: what they print, how they exit, and what they say of a faulty scene.
+#![cfg(feature = "hdf5")]
+
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+
+fn root() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn pliant(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_pliant")).args(arguments).stdin(Stdio::null()).output().unwrap()
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+/// A pendulum on a flexible boom, as text to be broken.
+fn scene(folder: &Path) -> String {
+    let modal = root().join("modes/boom_craig_bampton.h5");
+    std::fs::copy(modal, folder.join("boom.h5")).unwrap();
+    r#"name = "pendulum on a boom"
+gravity = [0.0, 0.0, -9.81]
+
+[[body]]
+name = "boom"
+modal_file = "boom.h5"
+modes = { count = 4 }
+
+[[body]]
+name = "bob"
+mass = 2.0
+center_of_mass = [0.3, 0.0, 0.0]
+inertia = [[0.01, 0.0, 0.0], [0.0, 0.02, 0.0], [0.0, 0.0, 0.02]]
+
+[[hinge]]
+name = "root"
+kind = "fixed"
+parent = "world"
+child = "boom"
+
+[[hinge]]
+name = "pin"
+kind = "revolute"
+axis = [0.0, 1.0, 0.0]
+parent = "boom"
+parent_node = "tip"
+child = "bob"
+position = [0.2]
+
+[simulation]
+duration = 0.2
+"#
+    .to_owned()
+}
+
+/// Runs a command on the scene with `from` replaced by `to`.
+fn with_change(command: &str, from: &str, to: &str) -> Output {
+    let folder = tempfile::tempdir().unwrap();
+    let original = scene(folder.path());
+    assert!(from.is_empty() || original.contains(from), "{from} is not in the scene");
+    let path = folder.path().join("scene.toml");
+    std::fs::write(&path, original.replacen(from, to, 1)).unwrap();
+    pliant(&[command, path.to_str().unwrap()])
+}
+
+#[test]
+fn a_sound_scene_is_accepted_evaluated_and_run() {
+    for command in ["check", "eval", "run"] {
+        let done = with_change(command, "", "");
+        assert_eq!(done.status.code(), Some(0), "{command}: {}", text(&done.stderr));
+    }
+}
+
+#[test]
+fn faults_of_a_scene_are_named_with_line_key_and_remedy_and_exit_2() {
+    let cases: &[(&str, &str, &[&str])] = &[
+        ("mass = 2.0", "mas = 2.0", &["line 12", "unknown field `mas`", "mass"]),
+        ("mass = 2.0", "mass = \"2 kg\"", &["line 12", "invalid type: string", "expected f64"]),
+        ("mass = 2.0", "mass = nan", &["scene.toml:12:8", "body[2].mass", "not finite"]),
+        ("mass = 2.0", "mass = -2.0", &["scene.toml:12:8", "\"bob\"", "-2", "zero or positive"]),
+        ("mass = 2.0\n", "", &["body[2]", "needs mass and inertia (rigid) or modal_file (flexible)"]),
+        ("0.01, 0.0, 0.0]", "0.09, 0.0, 0.0]", &["\"bob\"", "principal values", "sum of the other two"]),
+        ("parent = \"boom\"", "parent = \"bom\"", &["hinge[2].parent", "\"bom\" is not a body", "\"boom\", \"bob\""]),
+        ("parent_node = \"tip\"", "parent_node = \"tp\"", &["hinge[2].parent_node", "\"tp\" is not an interface", "\"root\", \"tip\""]),
+        ("parent_node = \"tip\"\n", "", &["parent \"boom\" is flexible", "parent_node", "\"tip\""]),
+        ("child = \"bob\"", "child = \"boom\"", &["\"boom\" is the child of hinge \"root\" and of hinge \"pin\""]),
+        ("parent = \"world\"", "parent = \"bob\"", &["cycle", "\"boom\"", "\"bob\""]),
+        ("kind = \"revolute\"", "kind = \"revolut\"", &["hinge[2].kind", "known kinds: fixed, revolute"]),
+        ("axis = [0.0, 1.0, 0.0]", "axis = [0.0, 0.0, 0.0]", &["hinge[2].axis", "no direction"]),
+        ("axis = [0.0, 1.0, 0.0]", "axis = [0.0, 1.0]", &["line 26", "invalid length 2"]),
+        ("position = [0.2]", "position = [0.2, 0.1]", &["hinge[2].position", "2 value(s)", "expected 1"]),
+        ("position = [0.2]", "motion = { sine = { amplitude = 1.0 } }", &["missing field `frequency_hz`"]),
+        ("position = [0.2]", "torque = { constant = 1.0, sine = { amplitude = 1.0, frequency_hz = 1.0 } }", &["exactly one of"]),
+        ("modes = { count = 4 }", "modes = [1, 99]", &["body[1].modes", "mode 99", "1 to 12"]),
+        ("modes = { count = 4 }", "inertia_order = 3", &["body[1].inertia_order", "0, 1 or 2"]),
+        ("modes = { count = 4 }", "mass = 1.0", &["has a modal_file", "remove mass"]),
+        ("\"boom.h5\"", "\"bom.h5\"", &["body[1].modal_file", "bom.h5", "cannot be opened"]),
+        ("duration = 0.2", "duration = -1.0", &["simulation.duration", "must be positive"]),
+        ("duration = 0.2", "integrator = \"rk5\"", &["simulation.integrator", "\"rk5\"", "dormand_prince"]),
+        ("[simulation]", "[[closure]]\nname = \"c\"\n[simulation]", &["closure"]),
+        ("[simulation]", "[[monitor]]\nhinge = \"pn\"\n[simulation]", &["monitor[1].hinge", "\"pn\" is not a hinge"]),
+        ("[simulation]", "[[load]]\nbody = \"bob\"\n[simulation]", &["load[1]", "force, moment or both"]),
+        ("[simulation]", "[simulation", &["line 31", "TOML parse error"]),
+    ];
+    for (from, to, expected) in cases {
+        let done = with_change("check", from, to);
+        let message = text(&done.stderr);
+        assert_eq!(done.status.code(), Some(2), "{to}: {message}");
+        for part in *expected {
+            assert!(message.contains(part), "{to}: no \"{part}\" in: {message}");
+        }
+    }
+}
+
+#[test]
+fn a_scene_without_duration_is_evaluated_but_not_run() {
+    assert_eq!(with_change("eval", "duration = 0.2", "").status.code(), Some(0));
+    let done = with_change("run", "duration = 0.2", "");
+    assert_eq!(done.status.code(), Some(2));
+    assert!(text(&done.stderr).contains("--duration"));
+}
+
+#[test]
+fn a_missing_scene_says_so() {
+    let done = pliant(&["run", "no/such/scene.toml"]);
+    assert_eq!(done.status.code(), Some(2));
+    assert!(text(&done.stderr).contains("no/such/scene.toml: cannot read the scene"));
+}
+
+#[test]
+fn a_hinge_that_moves_no_mass_is_named() {
+    let done = with_change("run", "mass = 2.0\ncenter_of_mass = [0.3, 0.0, 0.0]\ninertia = [[0.01, 0.0, 0.0], [0.0, 0.02, 0.0], [0.0, 0.0, 0.02]]", "mass = 0.0");
+    assert_eq!(done.status.code(), Some(3), "{}", text(&done.stderr));
+    assert!(text(&done.stderr).contains("hinge \"pin\" between \"boom\" and \"bob\""), "{}", text(&done.stderr));
+}
+
+#[test]
+fn the_report_of_a_run_has_the_documented_keys() {
+    let example = root().join("examples/01_double_pendulum/scene.toml");
+    let done = pliant(&["run", example.to_str().unwrap(), "--json"]);
+    assert_eq!(done.status.code(), Some(0), "{}", text(&done.stderr));
+    let report: Value = serde_json::from_slice(&done.stdout).unwrap();
+    for key in ["simulated_s", "wall_s", "integrator", "steps", "rejected_steps", "evaluations", "errors", "peaks", "final", "left_out"] {
+        assert!(!report[key].is_null(), "{key}");
+    }
+    for key in ["energy", "momentum", "audit", "closure", "local"] {
+        assert!(report["errors"].get(key).is_some(), "errors.{key}");
+    }
+    assert_eq!(report["simulated_s"], 2.0);
+    let peak = &report["peaks"]["hinges"]["shoulder"];
+    assert!(peak["moment"].as_f64().unwrap() < 1e-9 && peak["force"].as_f64().unwrap() > 9.81 && peak["time_s"].is_number());
+    assert!(report["final"]["hinges"]["elbow"]["load"]["force"].is_array());
+}
+
+#[test]
+fn overrides_change_the_scene_and_faulty_ones_are_refused() {
+    let example = root().join("examples/02_hub_two_panels/scene.toml");
+    let example = example.to_str().unwrap();
+    let run = |more: &[&str]| pliant(&[&["eval", example, "--json"], more].concat());
+    let modes = |done: &Output, body: &str| {
+        let value: Value = serde_json::from_slice(&done.stdout).unwrap();
+        value["bodies"][body]["modal_position"].as_array().unwrap().len()
+    };
+    assert_eq!(modes(&run(&["--modes", "3"]), "panel_left"), 3);
+    let rigid = run(&["--rigid", "panel_left"]);
+    assert_eq!((modes(&rigid, "panel_left"), modes(&rigid, "panel_right")), (0, 10));
+    let wrong = run(&["--rigid", "hub"]);
+    assert_eq!(wrong.status.code(), Some(2));
+    assert!(text(&wrong.stderr).contains("panel_left, panel_right"));
+    let wrong = pliant(&["run", example, "--integrator", "euler"]);
+    assert_eq!(wrong.status.code(), Some(2));
+    assert!(text(&wrong.stderr).contains("--integrator: \"euler\""), "{}", text(&wrong.stderr));
+}
+
+#[test]
+fn a_run_that_diverges_stops_with_exit_3_and_keeps_what_it_has() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.toml");
+    let scene = scene(folder.path()).replace("duration = 0.2", "duration = 5.0\nintegrator = \"rk4\"\nstep = 0.05");
+    std::fs::write(&path, scene).unwrap();
+    let results = folder.path().join("run.h5");
+    let done = pliant(&["run", path.to_str().unwrap(), "--out", results.to_str().unwrap()]);
+    let message = text(&done.stderr);
+    assert_eq!(done.status.code(), Some(3), "{message}");
+    assert!(message.contains("larger than that") && message.contains("left finite numbers") && message.contains("mode 4 of body \"boom\""), "{message}");
+    let file = hdf5::File::open(&results).unwrap();
+    assert!(file.dataset("time").unwrap().size() > 1);
+    assert!(text(&done.stdout).contains("peak hinge loads"));
+}
+
+#[test]
+fn files_that_cannot_be_written_are_named() {
+    let example = root().join("examples/01_double_pendulum/scene.toml");
+    let done = pliant(&["run", example.to_str().unwrap(), "--out", "no/such/folder/run.h5"]);
+    assert_eq!(done.status.code(), Some(2));
+    assert!(text(&done.stderr).contains("no/such/folder/run.h5"), "{}", text(&done.stderr));
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_is_said_and_the_report_still_comes() {
+    // every write to /dev/full fails as on a full disk
+    let example = root().join("examples/01_double_pendulum/scene.toml");
+    let done = pliant(&["run", example.to_str().unwrap(), "--out", "/dev/full"]);
+    assert!(matches!(done.status.code(), Some(2 | 3)), "{:?}", done.status);
+    assert!(text(&done.stderr).contains("/dev/full"), "{}", text(&done.stderr));
+}
+
+#[test]
+fn a_closed_pipe_ends_the_program_quietly() {
+    let example = root().join("examples/01_double_pendulum/scene.toml");
+    let mut child = Command::new(env!("CARGO_BIN_EXE_pliant"))
+        .args(["run", example.to_str().unwrap(), "--json"])
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    let done = child.wait_with_output().unwrap();
+    assert!(!text(&done.stderr).contains("panicked"), "{}", text(&done.stderr));
+    assert_eq!(done.status.code(), Some(0));
+}
+
+#[test]
+fn every_number_of_an_evaluation_reads_back_to_the_same_f64() {
+    let example = root().join("examples/03_boom_tip_mass/scene.toml");
+    let json = |()| text(&pliant(&["eval", example.to_str().unwrap(), "--time", "1.0", "--json"]).stdout);
+    let first = json(());
+    let value: Value = serde_json::from_str(&first).unwrap();
+    assert_eq!(serde_json::from_str::<Value>(&serde_json::to_string(&value).unwrap()).unwrap(), value);
+    assert_eq!(first, json(()), "the same scene twice is bit-equal");
+}
+
+#[test]
+fn every_example_passes_its_check() {
+    let folder = root().join("examples");
+    let mut scenes = Vec::new();
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        assert!(path.join("README.md").exists(), "{} has no README.md", path.display());
+        scenes.extend(std::fs::read_dir(path).unwrap().map(|e| e.unwrap().path()).filter(|p| p.extension().is_some_and(|e| e == "toml")));
+    }
+    assert!(scenes.len() >= 6);
+    let names: Vec<_> = scenes.iter().map(|p| p.to_str().unwrap()).collect();
+    let done = pliant(&[&["check"], names.as_slice()].concat());
+    assert_eq!(done.status.code(), Some(0), "{}", text(&done.stderr));
+}
