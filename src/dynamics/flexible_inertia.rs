@@ -44,7 +44,7 @@ impl FlexibleInertia {
         let n = integrals.mode_count();
         self.W.copy_from_slice(&integrals.shape_position);
         if order >= InertiaOrder::First {
-            for (w, p) in self.W.chunks_exact_mut(n).zip(integrals.shape_shape.chunks_exact(n * n)) {
+            for (w, p) in self.W.chunks_exact_mut(n.max(1)).zip(integrals.shape_shape.chunks_exact((n * n).max(1))) {
                 add_product(p, eta, w);
             }
         }
