@@ -9,7 +9,7 @@ use pliant::model::modal_body::Boundary;
 use pliant::model::{InertiaOrder, State, System};
 
 const DURATION: f64 = 0.4;
-/// Steps per run: three halvings, from where the fastest motion of these trees (some 100 rad/s) turns by 0.2 rad a step.
+/// Steps per run: three halvings, from where the vibrations of these trees (10 to 60 rad/s) turn by about 0.1 rad a step.
 const STEPS: [f64; 4] = [200.0, 400.0, 800.0, 1600.0];
 
 /// Largest drifts over a run: of energy less work over the largest kinetic energy, of momenta over their largest size.
@@ -51,7 +51,7 @@ fn free_recipe() -> Recipe {
     Recipe { base: Some("free"), gravity: false, loads: false, dampers: false, ..Recipe::default() }
 }
 
-/// `seeds` are those whose fastest coupled vibration the coarsest step resolves.
+/// `seeds` are those whose gimbals stay away from lock during the run: 22, 25, 30 and 36 run into it, which no method passes.
 fn assert_conserved(name: &str, recipe: &Recipe, seeds: &[u64], momenta: bool) {
     let mut sums = [[0.0; STEPS.len()]; 3];
     for seed in seeds {

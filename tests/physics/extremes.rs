@@ -143,7 +143,7 @@ fn gimbal_lock_is_an_error_and_a_spherical_hinge_does_not_know_it() {
     }
     // R05 from any attitude: the angular velocity in body axes is the same
     let expected = [-0.999_964_488_599_380_366, 0.013_077_520_413_042_319_8, 0.577_387_500_863_391_946];
-    for attitude in [[0.0, FRAC_PI_2, 0.0], [3.141_592, 0.0, 0.0], [1.0, -2.0, 1.5]] {
+    for attitude in [[0.0, FRAC_PI_2, 0.0], [3.1, 0.0, 0.0], [1.0, -2.0, 1.5]] {
         let mut pivot = hinge("pivot", "spherical", &[], WORLD, "top", [0.0; 3]);
         pivot.position = quaternion_of_vector(&Vector3::from(attitude)).to_vec();
         pivot.velocity = vec![0.01, 1.0, 0.01];
@@ -226,18 +226,18 @@ fn the_predicted_stable_step_divides_bounded_from_diverging_runs() {
 fn impossible_masses_and_inertias_are_refused_by_name() {
     let with = |mass: f64, center: f64, inertia: [f64; 3]| {
         let hinges = vec![hinge("joint", "free", &[], WORLD, "bus", [0.0; 3])];
-        Definition { bodies: vec![rigid("bus", mass, [center, 0.0, 0.0], inertia)], hinges, ..Definition::default() }.build().map(|_| ())
+        Definition { bodies: vec![rigid("bus", mass, [center, 0.0, 0.0], inertia)], hinges, ..Definition::default() }.build().err()
     };
     for inertia in [[1.0, 1.0, 3.0], [-1.0, 1.0, 1.0], [f64::NAN, 1.0, 1.0], [f64::INFINITY, 1.0, 1.0]] {
-        let error = with(1.0, 0.0, inertia).unwrap_err();
+        let error = with(1.0, 0.0, inertia).unwrap();
         assert!(matches!(&error, ModelError::BadInertia { item, .. } if item == "bus"), "{error}");
         assert!(error.to_string().contains("principal values"), "{error}");
     }
     for mass in [-1.0, f64::NAN, f64::INFINITY] {
-        assert!(matches!(with(mass, 0.0, [1.0; 3]).unwrap_err(), ModelError::BadNumber { item, .. } if item == "bus"));
+        assert!(matches!(with(mass, 0.0, [1.0; 3]).unwrap(), ModelError::BadNumber { item, .. } if item == "bus"));
     }
     for center in [f64::NAN, f64::INFINITY] {
-        assert!(with(1.0, center, [1.0; 3]).is_err(), "a centre of mass at {center} must be refused");
+        assert!(with(1.0, center, [1.0; 3]).is_some(), "a centre of mass at {center} must be refused");
     }
 }
 

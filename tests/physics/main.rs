@@ -1,4 +1,5 @@
 //! Physics of the library: identities against independent routes, conservation laws, published numbers.
+#![allow(clippy::excessive_precision, reason = "reference values keep the digits of their sources")]
 
 #[path = "../support/mod.rs"]
 mod support;

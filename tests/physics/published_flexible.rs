@@ -155,3 +155,19 @@ fn hinge_accelerations_and_loads_do_not_depend_on_the_modal_basis() {
         assert_close(&g, &f, allowed, &format!("seed {seed}: loads"));
     }
 }
+
+#[test]
+fn a_flexible_body_of_no_retained_modes_is_the_rigid_one() {
+    let load = |body: BodyDefinition| {
+        let mut pin = hinge("pin", "universal", &[[0.0, 1.0, 0.0], Z], WORLD, &body.name, [0.0; 3]);
+        (pin.position, pin.velocity) = (vec![0.3, -0.2], vec![1.1, 0.7]);
+        let gravity = nalgebra::Vector3::new(0.0, 0.0, -9.81);
+        let (system, state) = Definition { gravity, bodies: vec![body], hinges: vec![pin], loads: vec![] }.build().unwrap();
+        let mut workspace = Workspace::new(&system);
+        forward_dynamics(&system, &state, &mut workspace).unwrap();
+        [workspace.acceleration.hinge.as_slice(), hinge_load(&workspace, 0).as_slice()].concat()
+    };
+    let bare = load(flexible("beam", exact_beam(3).with_modes(&[])));
+    let rod = load(rigid("rod", 1.0, [0.5, 0.0, 0.0], [0.0, 1.0 / 12.0, 1.0 / 12.0]));
+    assert_close(&bare, &rod, 64.0 * EPS, "accelerations and load");
+}
