@@ -77,10 +77,10 @@ fn a_sound_scene_is_accepted_evaluated_and_run() {
 #[test]
 fn faults_of_a_scene_are_named_with_line_key_and_remedy_and_exit_2() {
     let cases: &[(&str, &str, &[&str])] = &[
-        ("mass = 2.0", "mas = 2.0", &["line 12", "unknown field `mas`", "mass"]),
-        ("mass = 2.0", "mass = \"2 kg\"", &["line 12", "invalid type: string", "expected f64"]),
-        ("mass = 2.0", "mass = nan", &["scene.toml:12:8", "body[2].mass", "not finite"]),
-        ("mass = 2.0", "mass = -2.0", &["scene.toml:12:8", "\"bob\"", "-2", "zero or positive"]),
+        ("mass = 2.0", "mas = 2.0", &["line 11", "unknown field `mas`", "mass"]),
+        ("mass = 2.0", "mass = \"2 kg\"", &["line 11", "invalid type: string", "expected f64"]),
+        ("mass = 2.0", "mass = nan", &["scene.toml:11:8", "body[2].mass", "not finite"]),
+        ("mass = 2.0", "mass = -2.0", &["scene.toml:11:8", "\"bob\"", "-2", "zero or positive"]),
         ("mass = 2.0\n", "", &["body[2]", "needs mass and inertia (rigid) or modal_file (flexible)"]),
         ("0.01, 0.0, 0.0]", "0.09, 0.0, 0.0]", &["\"bob\"", "principal values", "sum of the other two"]),
         ("parent = \"boom\"", "parent = \"bom\"", &["hinge[2].parent", "\"bom\" is not a body", "\"boom\", \"bob\""]),
@@ -90,7 +90,7 @@ fn faults_of_a_scene_are_named_with_line_key_and_remedy_and_exit_2() {
         ("parent = \"world\"", "parent = \"bob\"", &["cycle", "\"boom\"", "\"bob\""]),
         ("kind = \"revolute\"", "kind = \"revolut\"", &["hinge[2].kind", "known kinds: fixed, revolute"]),
         ("axis = [0.0, 1.0, 0.0]", "axis = [0.0, 0.0, 0.0]", &["hinge[2].axis", "no direction"]),
-        ("axis = [0.0, 1.0, 0.0]", "axis = [0.0, 1.0]", &["line 26", "invalid length 2"]),
+        ("axis = [0.0, 1.0, 0.0]", "axis = [0.0, 1.0]", &["line 24", "invalid length 2"]),
         ("position = [0.2]", "position = [0.2, 0.1]", &["hinge[2].position", "2 value(s)", "expected 1"]),
         ("position = [0.2]", "motion = { sine = { amplitude = 1.0 } }", &["missing field `frequency_hz`"]),
         ("position = [0.2]", "torque = { constant = 1.0, sine = { amplitude = 1.0, frequency_hz = 1.0 } }", &["exactly one of"]),
@@ -103,7 +103,7 @@ fn faults_of_a_scene_are_named_with_line_key_and_remedy_and_exit_2() {
         ("[simulation]", "[[closure]]\nname = \"c\"\n[simulation]", &["closure"]),
         ("[simulation]", "[[monitor]]\nhinge = \"pn\"\n[simulation]", &["monitor[1].hinge", "\"pn\" is not a hinge"]),
         ("[simulation]", "[[load]]\nbody = \"bob\"\n[simulation]", &["load[1]", "force, moment or both"]),
-        ("[simulation]", "[simulation", &["line 31", "TOML parse error"]),
+        ("[simulation]", "[simulation", &["line 30", "TOML parse error"]),
     ];
     for (from, to, expected) in cases {
         let done = with_change("check", from, to);
@@ -132,7 +132,11 @@ fn a_missing_scene_says_so() {
 
 #[test]
 fn a_hinge_that_moves_no_mass_is_named() {
-    let done = with_change("run", "mass = 2.0\ncenter_of_mass = [0.3, 0.0, 0.0]\ninertia = [[0.01, 0.0, 0.0], [0.0, 0.02, 0.0], [0.0, 0.0, 0.02]]", "mass = 0.0");
+    let done = with_change(
+        "run",
+        "mass = 2.0\ncenter_of_mass = [0.3, 0.0, 0.0]\ninertia = [[0.01, 0.0, 0.0], [0.0, 0.02, 0.0], [0.0, 0.0, 0.02]]",
+        "mass = 0.0",
+    );
     assert_eq!(done.status.code(), Some(3), "{}", text(&done.stderr));
     assert!(text(&done.stderr).contains("hinge \"pin\" between \"boom\" and \"bob\""), "{}", text(&done.stderr));
 }
@@ -185,7 +189,7 @@ fn a_run_that_diverges_stops_with_exit_3_and_keeps_what_it_has() {
     let done = pliant(&["run", path.to_str().unwrap(), "--out", results.to_str().unwrap()]);
     let message = text(&done.stderr);
     assert_eq!(done.status.code(), Some(3), "{message}");
-    assert!(message.contains("larger than that") && message.contains("left finite numbers") && message.contains("mode 4 of body \"boom\""), "{message}");
+    assert!(message.contains("larger than that") && message.contains("left finite numbers, fastest in"), "{message}");
     let file = hdf5::File::open(&results).unwrap();
     assert!(file.dataset("time").unwrap().size() > 1);
     assert!(text(&done.stdout).contains("peak hinge loads"));

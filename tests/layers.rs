@@ -93,8 +93,21 @@ fn every_file_begins_by_saying_what_it_is() {
 #[test]
 fn the_top_level_holds_what_a_user_needs_and_nothing_else() {
     let allowed = [
-        "Cargo.toml", "Cargo.lock", "src", "modes", "examples", "tests", "scripts", "README.md", "LICENSE-MIT", "LICENSE-APACHE", ".ci", ".gitignore",
-        ".cargo", "rustfmt.toml", "clippy.toml",
+        "Cargo.toml",
+        "Cargo.lock",
+        "src",
+        "modes",
+        "examples",
+        "tests",
+        "scripts",
+        "README.md",
+        "LICENSE-MIT",
+        "LICENSE-APACHE",
+        ".ci",
+        ".gitignore",
+        ".cargo",
+        "rustfmt.toml",
+        "clippy.toml",
     ];
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let ignored = [".git", "target", ".venv", "out", ".pytest_cache"];

@@ -29,7 +29,8 @@ fn check_file(file: &Path, output: &mut dyn Write) -> Result<(serde_json::Value,
         Some("h5" | "hdf5") => check_modal_file(file, output),
         Some("toml") => check_scene(file, output),
         _ => {
-            let message = format!("{}: neither a scene (.toml) nor a modal file (.h5) by its name; rename it or name another file", file.display());
+            let message =
+                format!("{}: neither a scene (.toml) nor a modal file (.h5) by its name; rename it or name another file", file.display());
             Ok((serde_json::json!({ "file": file.to_string_lossy(), "accepted": false, "messages": [message] }), vec![message]))
         }
     }

@@ -9,12 +9,7 @@ use std::io::Write;
 
 impl From<&SceneArguments> for Overrides {
     fn from(arguments: &SceneArguments) -> Self {
-        Self {
-            integrator: arguments.integrator.clone(),
-            modes: arguments.modes,
-            rigid: arguments.rigid.clone(),
-            duration: None,
-        }
+        Self { integrator: arguments.integrator.clone(), modes: arguments.modes, rigid: arguments.rigid.clone(), duration: None }
     }
 }
 

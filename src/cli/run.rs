@@ -65,10 +65,13 @@ pub fn run(arguments: &RunArguments, output: &mut dyn Write) -> Result<(), Failu
     }
     match &summary.outcome {
         Outcome::Failed(failure) => return Err(Failure::Stopped(format!("the run stopped early: {failure}; what was computed is kept"))),
-        Outcome::Stopped => return Err(Failure::Stopped(format!("interrupted at t = {} s; what was computed is kept", number(summary.time)))),
+        Outcome::Stopped => {
+            return Err(Failure::Stopped(format!("interrupted at t = {} s; what was computed is kept", number(summary.time))));
+        }
         Outcome::Completed => {}
     }
-    let problems: Vec<_> = report.files.iter().filter_map(|f| f.problem.as_ref().map(|p| format!("{} {}: {p}", f.kind, f.target))).collect();
+    let problems: Vec<_> =
+        report.files.iter().filter_map(|f| f.problem.as_ref().map(|p| format!("{} {}: {p}", f.kind, f.target))).collect();
     if problems.is_empty() { Ok(()) } else { Err(Failure::Stopped(problems.join("\nerror: "))) }
 }
 
@@ -231,7 +234,7 @@ impl Progress {
 impl Observer for Progress {
     fn observe(&mut self, sample: &Sample<'_>) -> Flow {
         self.bar.set_position((sample.state.time * TICKS) as u64);
-        if sample.steps % 64 == 0 {
+        if sample.steps.is_multiple_of(64) {
             self.bar.set_message(format!("t = {} s, {} steps", number(sample.state.time), sample.steps));
         }
         if self.interrupted.load(Ordering::Relaxed) { Flow::Stop } else { Flow::Continue }

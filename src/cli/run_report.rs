@@ -19,14 +19,26 @@ pub fn write(scene: &str, report: &RunReport, output: &mut dyn Write) -> Result<
         report.evaluations
     )?;
     let right = Align::Right;
-    let mut hinges = Table::new(&[("hinge", Align::Left), ("peak moment (N m)", right), ("at (s)", right), ("peak force (N)", right), ("at (s)", right)]);
+    let mut hinges = Table::new(&[
+        ("hinge", Align::Left),
+        ("peak moment (N m)", right),
+        ("at (s)", right),
+        ("peak force (N)", right),
+        ("at (s)", right),
+    ]);
     for (name, peak) in report.peaks.hinges.iter() {
         hinges.row([name.to_owned(), number(peak.moment), number(peak.moment_time_s), number(peak.force), number(peak.force_time_s)]);
     }
     writeln!(output, "\npeak hinge loads, by the parent on the child, moment about O:")?;
     hinges.write(output)?;
     if !report.peaks.bodies.0.is_empty() {
-        let mut bodies = Table::new(&[("body", Align::Left), ("peak von Mises (Pa)", right), ("at (s)", right), ("node", right), ("place x, y, z (m)", Align::Left)]);
+        let mut bodies = Table::new(&[
+            ("body", Align::Left),
+            ("peak von Mises (Pa)", right),
+            ("at (s)", right),
+            ("node", right),
+            ("place x, y, z (m)", Align::Left),
+        ]);
         for (name, peak) in report.peaks.bodies.iter() {
             let place = peak.position.map(number).join(", ");
             bodies.row([name.to_owned(), number(peak.von_mises), number(peak.time_s), peak.node.to_string(), place]);
@@ -35,10 +47,24 @@ pub fn write(scene: &str, report: &RunReport, output: &mut dyn Write) -> Result<
         bodies.write(output)?;
     }
     if !report.exceedances.is_empty() {
-        let mut table = Table::new(&[("limit exceeded", Align::Left), ("limit", right), ("peak", right), ("unit", Align::Left), ("from (s)", right), ("to (s)", right)]);
+        let mut table = Table::new(&[
+            ("limit exceeded", Align::Left),
+            ("limit", right),
+            ("peak", right),
+            ("unit", Align::Left),
+            ("from (s)", right),
+            ("to (s)", right),
+        ]);
         for e in &report.exceedances {
             let end = e.end_s.map_or_else(|| "end".to_owned(), number);
-            table.row([format!("{} of {} \"{}\"", e.quantity, e.kind, e.name), number(e.limit), number(e.peak), e.unit.to_owned(), number(e.start_s), end]);
+            table.row([
+                format!("{} of {} \"{}\"", e.quantity, e.kind, e.name),
+                number(e.limit),
+                number(e.peak),
+                e.unit.to_owned(),
+                number(e.start_s),
+                end,
+            ]);
         }
         writeln!(output, "\nlimits:")?;
         table.write(output)?;

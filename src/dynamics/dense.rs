@@ -38,7 +38,11 @@ pub fn equations(system: &System, state: &State) -> DenseEquations {
     for i in 0..n {
         unit.velocity.fill(0.0);
         unit.modal_velocity.fill(0.0);
-        if i < nv { unit.velocity[i] = 1.0 } else { unit.modal_velocity[i - nv] = 1.0 }
+        if i < nv {
+            unit.velocity[i] = 1.0
+        } else {
+            unit.modal_velocity[i - nv] = 1.0
+        }
         velocity_outward::velocity_outward(system, &unit, &workspace.pose, &mut workspace.velocity);
         columns.push(workspace.velocity.bodies.iter().map(|b| b.V).collect::<Vec<_>>());
     }

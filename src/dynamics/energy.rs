@@ -1,8 +1,8 @@
 //! Energies, momenta and the power of everything that is not conservative.
 
+use super::Workspace;
 use super::hinge_load::hinge_load;
 use super::world::{WorldFrame, world_frames};
-use super::Workspace;
 use crate::model::{BodyKind, State, System};
 use crate::spatial::shift::{angular, linear};
 use nalgebra::{Vector3, Vector6};

@@ -156,7 +156,15 @@ impl NewtonEuler {
     /// Follows all bodies with the given accelerations and sums their inertial forces inward.
     ///
     /// `pose` holds the inertias at the state's deformation and `force` the external loads, both of the state's last evaluation.
-    pub fn sweep(&mut self, system: &System, state: &State, hinge_acceleration: &[f64], modal_acceleration: &[f64], pose: &PoseScratch, force: &ForceScratch) {
+    pub fn sweep(
+        &mut self,
+        system: &System,
+        state: &State,
+        hinge_acceleration: &[f64],
+        modal_acceleration: &[f64],
+        pose: &PoseScratch,
+        force: &ForceScratch,
+    ) {
         let world = Motion { acceleration: -system.gravity, ..Self::rest() };
         for (k, body) in system.bodies.iter().enumerate() {
             let (parent, range) = match body.parent {
@@ -200,7 +208,15 @@ impl NewtonEuler {
         Motion { axes: Matrix3::identity(), position: zero, omega: zero, velocity: zero, spin: zero, acceleration: zero }
     }
 
-    fn inertial_force(&mut self, body: &Body, k: usize, state: &State, modal_acceleration: &[f64], pose: &PoseScratch, force: &ForceScratch) {
+    fn inertial_force(
+        &mut self,
+        body: &Body,
+        k: usize,
+        state: &State,
+        modal_acceleration: &[f64],
+        pose: &PoseScratch,
+        force: &ForceScratch,
+    ) {
         self.load[k] = Vector6::zeros();
         let motion = &self.motion[k];
         let turned = |x: &Vector3<f64>| motion.axes.tr_mul(x);
@@ -213,7 +229,8 @@ impl NewtonEuler {
                 let inertia: &flexible_inertia::FlexibleInertia = &pose.flexible[index].inertia;
                 let (eta, eta_dot) = (&state.modal_position[range.clone()], &state.modal_velocity[range.clone()]);
                 let b_modal = &mut self.b_modal[range.clone()];
-                let mut f = inertia.rigid.times(&alpha) + inertia.velocity_terms(&flexible.integrals, flexible.order, &omega, eta_dot, b_modal);
+                let mut f =
+                    inertia.rigid.times(&alpha) + inertia.velocity_terms(&flexible.integrals, flexible.order, &omega, eta_dot, b_modal);
                 let elastic = &mut self.elastic[range.clone()];
                 flexible.elastic_force(eta, eta_dot, elastic);
                 for (j, m) in range.enumerate() {
@@ -316,7 +333,10 @@ impl NewtonEuler {
                 }
             }
             let range = body.modal_range();
-            let scale = range.clone().map(|m| acceleration.modal[m].abs().max(self.elastic[m].abs()).max(self.b_modal[m].abs())).fold(0.0, f64::max);
+            let scale = range
+                .clone()
+                .map(|m| acceleration.modal[m].abs().max(self.elastic[m].abs()).max(self.b_modal[m].abs()))
+                .fold(0.0, f64::max);
             for m in range {
                 equation = equation.max(relative(modal[m].abs(), scale.max(self.inertial[k].amax())));
             }

@@ -28,7 +28,15 @@ impl<'a> Chart<'a> {
     /// A chart at `start`.
     #[must_use]
     pub fn new(system: &'a System, start: &State) -> Self {
-        Self { system, base: start.clone(), clock_rest: 0.0, work: 0.0, evaluations: 0, workspace: Workspace::new(system), state: start.clone() }
+        Self {
+            system,
+            base: start.clone(),
+            clock_rest: 0.0,
+            work: 0.0,
+            evaluations: 0,
+            workspace: Workspace::new(system),
+            state: start.clone(),
+        }
     }
 
     /// Number of increments: hinge rates and modes.
@@ -79,7 +87,10 @@ impl<'a> Chart<'a> {
     /// # Errors
     /// If the dynamics have no answer there.
     pub fn rate(&mut self, time: f64, y: &[f64], rate: &mut [f64]) -> Result<(), DynamicsError> {
-        let mut state = std::mem::replace(&mut self.state, State { time, position: vec![], velocity: vec![], modal_position: vec![], modal_velocity: vec![] });
+        let mut state = std::mem::replace(
+            &mut self.state,
+            State { time, position: vec![], velocity: vec![], modal_position: vec![], modal_velocity: vec![] },
+        );
         self.state_of(time, y, &mut state);
         let done = self.rate_at(&state, y, rate);
         self.state = state;
@@ -117,7 +128,10 @@ impl<'a> Chart<'a> {
         let step = h + self.clock_rest;
         let time = self.base.time + step;
         self.clock_rest = step - (time - self.base.time);
-        let mut state = std::mem::replace(&mut self.state, State { time, position: vec![], velocity: vec![], modal_position: vec![], modal_velocity: vec![] });
+        let mut state = std::mem::replace(
+            &mut self.state,
+            State { time, position: vec![], velocity: vec![], modal_position: vec![], modal_velocity: vec![] },
+        );
         self.state_of(time, y, &mut state);
         std::mem::swap(&mut self.base, &mut state);
         self.state = state;

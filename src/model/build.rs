@@ -242,7 +242,10 @@ impl Builder<'_> {
             }
         }
         let named = |(index, hinge): (usize, Option<usize>)| {
-            hinge.ok_or_else(|| ModelError::Unconnected { place: place("body", index, "name"), body: self.definition.bodies[index].name.clone() })
+            hinge.ok_or_else(|| ModelError::Unconnected {
+                place: place("body", index, "name"),
+                body: self.definition.bodies[index].name.clone(),
+            })
         };
         hinge_of.into_iter().enumerate().map(named).collect()
     }
@@ -290,7 +293,14 @@ impl Builder<'_> {
         Ok(order)
     }
 
-    fn add_body(&self, old: usize, h: usize, rank: &HashMap<usize, usize>, system: &mut System, state: &mut State) -> Result<(), ModelError> {
+    fn add_body(
+        &self,
+        old: usize,
+        h: usize,
+        rank: &HashMap<usize, usize>,
+        system: &mut System,
+        state: &mut State,
+    ) -> Result<(), ModelError> {
         let (definition, hinge) = (&self.definition.bodies[old], &self.definition.hinges[h]);
         let parent = if hinge.parent == WORLD {
             None
@@ -394,10 +404,8 @@ impl Builder<'_> {
                 body: hinge.parent.clone(),
             });
         }
-        Ok(body.map_or_else(
-            || Attachment::fixed(x, r),
-            |b| Attachment::fixed(b.frame_position + b.frame_rotation * x, b.frame_rotation * r),
-        ))
+        Ok(body
+            .map_or_else(|| Attachment::fixed(x, r), |b| Attachment::fixed(b.frame_position + b.frame_rotation * x, b.frame_rotation * r)))
     }
 
     fn frame(&self, h: usize, key: &'static str, frame: &Frame) -> Result<(Matrix3<f64>, Vector3<f64>), ModelError> {
@@ -457,13 +465,15 @@ impl Builder<'_> {
         }
         if given.motion.is_some() {
             if kind.has_quaternion() || rates == 0 {
-                return Err(ModelError::MotionOfQuaternion { place: place("hinge", h, "motion"), item: given.name.clone(), kind: kind.name() });
+                return Err(ModelError::MotionOfQuaternion {
+                    place: place("hinge", h, "motion"),
+                    item: given.name.clone(),
+                    kind: kind.name(),
+                });
             }
-            for (key, used) in [
-                ("position", !given.position.is_empty()),
-                ("velocity", !given.velocity.is_empty()),
-                ("torque", given.torque.is_some()),
-            ] {
+            for (key, used) in
+                [("position", !given.position.is_empty()), ("velocity", !given.velocity.is_empty()), ("torque", given.torque.is_some())]
+            {
                 if used {
                     return Err(ModelError::Excluded {
                         place: place("hinge", h, key),
@@ -476,7 +486,12 @@ impl Builder<'_> {
         }
         for (key, values) in [("stiffness", &given.stiffness), ("damping", &given.damping)] {
             if let Some(&bad) = values.iter().find(|x| !(**x >= 0.0)) {
-                return Err(ModelError::BadNumber { place: place("hinge", h, key), item: given.name.clone(), found: bad, expected: "zero or positive" });
+                return Err(ModelError::BadNumber {
+                    place: place("hinge", h, key),
+                    item: given.name.clone(),
+                    found: bad,
+                    expected: "zero or positive",
+                });
             }
         }
         Ok(Hinge {
@@ -562,7 +577,12 @@ impl Builder<'_> {
                 LoadPoint::Node { position: *position, mode_shape: mode_shape.clone() }
             }
             (PointDefinition::Interface(name), BodyDefinitionKind::Rigid { .. }) => {
-                return Err(ModelError::InterfaceOfRigidBody { place: place("load", index, "node"), item, found: name.clone(), body: given.body.clone() });
+                return Err(ModelError::InterfaceOfRigidBody {
+                    place: place("load", index, "node"),
+                    item,
+                    found: name.clone(),
+                    body: given.body.clone(),
+                });
             }
             (PointDefinition::Node { .. }, BodyDefinitionKind::Rigid { .. }) => {
                 return Err(ModelError::InterfaceOfRigidBody {
@@ -609,7 +629,11 @@ const UNIT_TOLERANCE: f64 = 1e-6;
 
 fn unit(q: &Quaternion, place: Place, item: &str) -> Result<Quaternion, ModelError> {
     let found = rotation::norm(q);
-    if (found - 1.0).abs() <= UNIT_TOLERANCE { Ok(rotation::normalized(q)) } else { Err(ModelError::NotUnit { place, item: item.to_owned(), found }) }
+    if (found - 1.0).abs() <= UNIT_TOLERANCE {
+        Ok(rotation::normalized(q))
+    } else {
+        Err(ModelError::NotUnit { place, item: item.to_owned(), found })
+    }
 }
 
 fn check_rigid(index: usize, body: &BodyDefinition, mass: f64, inertia: &Matrix3<f64>) -> Result<(), ModelError> {
@@ -663,7 +687,11 @@ fn hinge_kind(h: usize, given: &HingeDefinition) -> Result<HingeKind, ModelError
         return Err(bad(key, format!("axis [{}, {}, {}] has no direction", zero.x, zero.y, zero.z), form));
     }
     if given.pitch.is_some() != (given.kind == "screw") {
-        return Err(bad("pitch", "pitch belongs to a screw hinge, and a screw needs one".into(), "give pitch = x in m/rad for kind = \"screw\" only"));
+        return Err(bad(
+            "pitch",
+            "pitch belongs to a screw hinge, and a screw needs one".into(),
+            "give pitch = x in m/rad for kind = \"screw\" only",
+        ));
     }
     finite(given.pitch.as_slice(), place("hinge", h, "pitch"), &given.name)?;
     let axes: Vec<_> = given.axes.iter().map(Vector3::normalize).collect();

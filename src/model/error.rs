@@ -87,7 +87,9 @@ pub enum ModelError {
         body: String,
     },
     /// A body that two hinges carry.
-    #[error("body \"{body}\" is the child of hinge \"{first}\" and of hinge \"{second}\"; a body has one inboard hinge, close a loop with a [[closure]]")]
+    #[error(
+        "body \"{body}\" is the child of hinge \"{first}\" and of hinge \"{second}\"; a body has one inboard hinge, close a loop with a [[closure]]"
+    )]
     TwoParents {
         /// Where.
         place: Place,

@@ -23,6 +23,7 @@ use nalgebra::{Matrix3, Vector3};
 
 /// Rigid or flexible.
 #[derive(Debug, Clone)]
+#[expect(clippy::large_enum_variant, reason = "rigid inertias lie in the array that the sweeps walk")]
 pub enum BodyKind {
     /// Inertia about O in O axes.
     Rigid(SpatialInertia),

@@ -20,10 +20,10 @@ pub mod set;
 pub mod surface;
 pub mod tracker;
 
+#[cfg(feature = "rerun")]
+pub use self::rerun::{ViewerError, ViewerTarget};
 pub use evaluation::Evaluation;
 pub use plan::{BodyBox, BodySurface, ModalFileRecord, Monitor, OutputPlan, PlanError};
 pub use report::RunReport;
-#[cfg(feature = "rerun")]
-pub use self::rerun::{ViewerError, ViewerTarget};
 pub use set::OutputSet;
 pub use surface::Surface;

@@ -45,7 +45,8 @@ pub fn plan(scene: &Scene, picture: bool) -> Result<OutputPlan, ModalFileError> 
             // centred on the mass, as the cuboid of equal inertia would be
             let center = match &body.kind {
                 BodyKind::Rigid(inertia) if body.mass() > 0.0 => {
-                    let c = nalgebra::Vector3::new(inertia.coupling[(2, 1)], inertia.coupling[(0, 2)], inertia.coupling[(1, 0)]) / body.mass();
+                    let c =
+                        nalgebra::Vector3::new(inertia.coupling[(2, 1)], inertia.coupling[(0, 2)], inertia.coupling[(1, 0)]) / body.mass();
                     body.frame_rotation.tr_mul(&(c - body.frame_position))
                 }
                 _ => nalgebra::Vector3::zeros(),

@@ -137,7 +137,8 @@ pub fn assemble(source: Source, overrides: &Overrides) -> Result<Scene, SceneErr
         boxes[k] = body.box_size;
     }
     describe_left_out(&spec, &system, &hinges, &mut left_out);
-    let name = spec.name.clone().unwrap_or_else(|| source.path.file_stem().map_or_else(|| "scene".into(), |s| s.to_string_lossy().into_owned()));
+    let name =
+        spec.name.clone().unwrap_or_else(|| source.path.file_stem().map_or_else(|| "scene".into(), |s| s.to_string_lossy().into_owned()));
     #[cfg(feature = "hdf5")]
     let flexible = assembly.chosen.into_iter().map(|(definition, selection)| (system.definition_order[definition], selection)).collect();
     Ok(Scene {
@@ -184,7 +185,10 @@ fn check_overrides(spec: &SceneSpec, overrides: &Overrides) -> Result<(), SceneE
         None => Ok(()),
         Some(name) => Err(SceneError::Override {
             option: "--rigid",
-            message: format!("\"{name}\" is not a flexible body of the scene; flexible bodies: {}", if flexible.is_empty() { "none".into() } else { flexible.join(", ") }),
+            message: format!(
+                "\"{name}\" is not a flexible body of the scene; flexible bodies: {}",
+                if flexible.is_empty() { "none".into() } else { flexible.join(", ") }
+            ),
         }),
     }
 }
@@ -197,7 +201,8 @@ fn names_to_indices(
     source: &Source,
 ) -> Result<Vec<usize>, SceneError> {
     let steps = |i| [Step::Key("output"), Step::Key(key), Step::Index(i)];
-    let index = |(i, name): (usize, &String)| find(name).ok_or_else(|| source.value(&steps(i), format!("\"{name}\" is not a {what} of the scene")));
+    let index =
+        |(i, name): (usize, &String)| find(name).ok_or_else(|| source.value(&steps(i), format!("\"{name}\" is not a {what} of the scene")));
     names.iter().enumerate().map(index).collect()
 }
 
@@ -210,7 +215,8 @@ fn monitor(index: usize, spec: &MonitorSpec, system: &System, source: &Source) -
     }
     match (&spec.hinge, &spec.body) {
         (Some(name), None) if spec.stress_limit.is_none() => {
-            let body = system.hinge_index(name).ok_or_else(|| source.value(&at("hinge"), format!("\"{name}\" is not a hinge of the scene")))?;
+            let body =
+                system.hinge_index(name).ok_or_else(|| source.value(&at("hinge"), format!("\"{name}\" is not a hinge of the scene")))?;
             Ok(Monitor::Hinge { body, moment_limit: spec.moment_limit, force_limit: spec.force_limit })
         }
         (None, Some(name)) if spec.moment_limit.is_none() && spec.force_limit.is_none() => {
@@ -262,7 +268,8 @@ impl Assembly<'_> {
 
     fn body(&mut self, index: usize, body: &BodySpec) -> Result<BodyDefinitionKind, SceneError> {
         let at = |key| [Step::Key("body"), Step::Index(index), Step::Key(key)];
-        let rigid_keys = [("mass", body.mass.is_some()), ("center_of_mass", body.center_of_mass.is_some()), ("inertia", body.inertia.is_some())];
+        let rigid_keys =
+            [("mass", body.mass.is_some()), ("center_of_mass", body.center_of_mass.is_some()), ("inertia", body.inertia.is_some())];
         let flexible_keys = [
             ("modes", body.modes.is_some()),
             ("damping_ratio", body.damping_ratio.is_some()),
@@ -270,7 +277,8 @@ impl Assembly<'_> {
             ("modal_position", !body.modal_position.is_empty()),
             ("modal_velocity", !body.modal_velocity.is_empty()),
         ];
-        let (foreign, needed) = if body.modal_file.is_some() { (rigid_keys.as_slice(), "mass") } else { (flexible_keys.as_slice(), "modal_file") };
+        let (foreign, needed) =
+            if body.modal_file.is_some() { (rigid_keys.as_slice(), "mass") } else { (flexible_keys.as_slice(), "modal_file") };
         if let Some((key, _)) = foreign.iter().find(|(_, given)| *given) {
             let message = if needed == "mass" {
                 format!("body \"{}\" has a modal_file, which gives its mass properties; remove {key}", body.name)
@@ -303,7 +311,10 @@ impl Assembly<'_> {
     fn flexible(&mut self, index: usize, body: &BodySpec, file: &Path) -> Result<BodyDefinitionKind, SceneError> {
         let _ = (&mut self.chosen, body, file, retained as fn(&Self, usize, &BodySpec, &[f64]) -> _);
         let _ = (inertia_order as fn(&Source, usize, &BodySpec) -> _, FlexibleDefinition::clone);
-        Err(self.source.value(&[Step::Key("body"), Step::Index(index), Step::Key("modal_file")], "this build reads no modal files; build with the feature \"hdf5\""))
+        Err(self.source.value(
+            &[Step::Key("body"), Step::Index(index), Step::Key("modal_file")],
+            "this build reads no modal files; build with the feature \"hdf5\"",
+        ))
     }
 
     #[cfg(feature = "hdf5")]
@@ -323,10 +334,13 @@ impl Assembly<'_> {
             None => modal.damping_ratio.clone(),
             Some(Numbers::One(z)) => vec![*z; modes.len()],
             // a list for the scene's own choice of modes still fits when an override retains fewer
-            Some(Numbers::Many(list)) if self.overrides.modes.is_some() || modes.is_empty() => list.iter().copied().take(modes.len()).collect(),
+            Some(Numbers::Many(list)) if self.overrides.modes.is_some() || modes.is_empty() => {
+                list.iter().copied().take(modes.len()).collect()
+            }
             Some(Numbers::Many(list)) => list.clone(),
         };
-        let start = |given: &[f64]| if self.is_overridden(body) { given.iter().copied().take(modes.len()).collect() } else { given.to_vec() };
+        let start =
+            |given: &[f64]| if self.is_overridden(body) { given.iter().copied().take(modes.len()).collect() } else { given.to_vec() };
         let definition = FlexibleDefinition {
             damping_ratio,
             order: inertia_order(self.source, index, body)?,
@@ -340,6 +354,7 @@ impl Assembly<'_> {
         Ok(BodyDefinitionKind::Flexible(definition))
     }
 
+    #[cfg(feature = "hdf5")]
     fn is_overridden(&self, body: &BodySpec) -> bool {
         self.overrides.modes.is_some() || self.overrides.rigid.contains(&body.name)
     }
@@ -394,8 +409,14 @@ impl Assembly<'_> {
             (Some(node), None, None) => PointDefinition::Interface(node.clone()),
             (None, Some(node), None) => self.mesh_node(index, node, number)?,
             (None, None, Some(point)) => PointDefinition::Point(Vector3::from(point)),
-            (None, None, None) if !flexible => PointDefinition::Point(Vector3::from(number.and_then(|n| spec.body[n].center_of_mass).unwrap_or_default())),
-            _ => return Err(self.source.value(&whole, "say where the load acts by one of node, mesh_node (flexible bodies) or point (rigid bodies)")),
+            (None, None, None) if !flexible => {
+                PointDefinition::Point(Vector3::from(number.and_then(|n| spec.body[n].center_of_mass).unwrap_or_default()))
+            }
+            _ => {
+                return Err(self
+                    .source
+                    .value(&whole, "say where the load acts by one of node, mesh_node (flexible bodies) or point (rigid bodies)"));
+            }
         };
         Ok(LoadDefinition { body: load.body.clone(), point, force: of(&load.force, "force")?, moment: of(&load.moment, "moment")?, axes })
     }

@@ -44,7 +44,8 @@ pub fn function(spec: &FunctionSpec, source: &Source, steps: &[Step]) -> Result<
         return Ok(TimeFunction::SmoothStep { from, to, start: step.start, end: step.end });
     }
     let terms = spec.sum.iter().flatten().enumerate();
-    let terms = terms.map(|(i, term)| function(term, source, &[&at("sum")[..], &[Step::Index(i)]].concat())).collect::<Result<Vec<_>, _>>()?;
+    let terms =
+        terms.map(|(i, term)| function(term, source, &[&at("sum")[..], &[Step::Index(i)]].concat())).collect::<Result<Vec<_>, _>>()?;
     let dimension = terms.first().map_or(0, TimeFunction::dimension);
     if terms.is_empty() || terms.iter().any(|t| t.dimension() != dimension) {
         return Err(source.value(&at("sum"), "a sum needs at least one term, and all terms the same number of components"));
@@ -80,10 +81,18 @@ fn csv_rows(file: &Path, source: &Source, steps: &[Step]) -> Result<Vec<(f64, Ve
         let record = record.map_err(|e| fault(e.to_string()))?;
         let numbers: Result<Vec<f64>, _> = record.iter().map(str::parse).collect();
         match numbers {
-            Ok(numbers) if numbers.len() >= 2 && numbers.iter().all(|x: &f64| x.is_finite()) => rows.push((numbers[0], numbers[1..].to_vec())),
+            Ok(numbers) if numbers.len() >= 2 && numbers.iter().all(|x: &f64| x.is_finite()) => {
+                rows.push((numbers[0], numbers[1..].to_vec()))
+            }
             // a heading names the columns
             Err(_) if number == 0 => {}
-            _ => return Err(fault(format!("row {} is \"{}\"; expected time, value, ... as finite numbers", number + 1, record.iter().collect::<Vec<_>>().join(",")))),
+            _ => {
+                return Err(fault(format!(
+                    "row {} is \"{}\"; expected time, value, ... as finite numbers",
+                    number + 1,
+                    record.iter().collect::<Vec<_>>().join(",")
+                )));
+            }
         }
     }
     Ok(rows)

@@ -21,11 +21,14 @@ pub struct Selection {
     pub content_sha256: String,
 }
 
+/// Modal data of one choice of modes, plain and packed.
+type Packed = (Arc<ModalBody>, Arc<ModalIntegrals>);
+
 /// Files and selections read so far.
 #[derive(Debug, Default)]
 pub struct ModalFiles {
     files: HashMap<PathBuf, (Rc<ModalFile>, Rc<ModalBody>, String)>,
-    packed: HashMap<(PathBuf, Vec<usize>), (Arc<ModalBody>, Arc<ModalIntegrals>)>,
+    packed: HashMap<(PathBuf, Vec<usize>), Packed>,
 }
 
 impl ModalFiles {
@@ -43,7 +46,7 @@ impl ModalFiles {
     }
 
     /// The body with the modes `modes` (0-based), packed.
-    pub fn pack(&mut self, path: &Path, body: &ModalBody, modes: &[usize]) -> (Arc<ModalBody>, Arc<ModalIntegrals>) {
+    pub fn pack(&mut self, path: &Path, body: &ModalBody, modes: &[usize]) -> Packed {
         let entry = self.packed.entry((path.to_owned(), modes.to_vec())).or_insert_with(|| {
             let selected = body.with_modes(modes);
             let integrals = ModalIntegrals::of(&selected);

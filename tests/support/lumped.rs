@@ -41,7 +41,8 @@ pub fn lumped_body(rng: &mut StdRng, boundary: Boundary, modes: usize) -> Lumped
         }
         basis.push(shape);
     }
-    let inner = |a: &[Vector3<f64>], b: &[Vector3<f64>]| -> f64 { masses.iter().zip(a.iter().zip(b)).map(|(m, (a, b))| m * a.dot(b)).sum() };
+    let inner =
+        |a: &[Vector3<f64>], b: &[Vector3<f64>]| -> f64 { masses.iter().zip(a.iter().zip(b)).map(|(m, (a, b))| m * a.dot(b)).sum() };
     for i in 0..basis.len() {
         // twice is enough
         for _ in 0..2 {
@@ -87,7 +88,11 @@ pub fn lumped_body(rng: &mut StdRng, boundary: Boundary, modes: usize) -> Lumped
         stiffness: None,
         momentum: shapes.iter().map(|s| sum3(&|i| s[i])).collect(),
         first_moment: shapes.iter().map(|s| sum33(&|i| outer(&points[i], &s[i]))).collect(),
-        second_moment: shapes.iter().flat_map(|a| shapes.iter().map(move |b| (a, b))).map(|(a, b)| sum33(&|i| outer(&a[i], &b[i]))).collect(),
+        second_moment: shapes
+            .iter()
+            .flat_map(|a| shapes.iter().map(move |b| (a, b)))
+            .map(|(a, b)| sum33(&|i| outer(&a[i], &b[i])))
+            .collect(),
         angular_momentum: None,
         geometric_stiffness: None,
         interfaces,

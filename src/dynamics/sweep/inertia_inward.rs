@@ -104,10 +104,7 @@ impl InertiaScratch {
                 }
             })
         };
-        Self {
-            bodies: vec![empty; system.bodies.len()],
-            flexible: system.bodies.iter().enumerate().filter_map(eliminate).collect(),
-        }
+        Self { bodies: vec![empty; system.bodies.len()], flexible: system.bodies.iter().enumerate().filter_map(eliminate).collect() }
     }
 }
 
