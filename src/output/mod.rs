@@ -6,7 +6,6 @@
 pub mod channels;
 pub mod evaluation;
 pub mod frame;
-#[cfg(feature = "rerun")]
 pub mod picture;
 pub mod plan;
 pub mod report;
@@ -17,11 +16,11 @@ pub mod results;
 pub mod set;
 pub mod surface;
 pub mod tracker;
+pub mod viewer;
 
 pub use evaluation::Evaluation;
 pub use plan::{BodyBox, BodySurface, ModalFileRecord, Monitor, OutputPlan, PlanError};
 pub use report::RunReport;
-#[cfg(feature = "rerun")]
-pub use rerun::{ViewerError, ViewerTarget};
 pub use set::OutputSet;
 pub use surface::Surface;
+pub use viewer::{ViewerError, ViewerStream, ViewerTarget};
