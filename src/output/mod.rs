@@ -6,7 +6,6 @@
 pub mod channels;
 pub mod evaluation;
 pub mod frame;
-#[cfg(feature = "rerun")]
 pub mod picture;
 pub mod plan;
 pub mod report;
@@ -19,6 +18,7 @@ pub mod scene_plan;
 pub mod set;
 pub mod surface;
 pub mod tracker;
+pub mod viewer;
 
 #[cfg(feature = "rerun")]
 pub use self::rerun::{ViewerError, ViewerTarget};
@@ -27,3 +27,4 @@ pub use plan::{BodyBox, BodySurface, ModalFileRecord, Monitor, OutputPlan, PlanE
 pub use report::RunReport;
 pub use set::OutputSet;
 pub use surface::Surface;
+pub use viewer::{ViewerError, ViewerStream, ViewerTarget};

@@ -1,1 +1,321 @@
-//! What pictures need besides the data: boxes, extent of the scene, scales of arrows and colours.
+//! What pictures need besides the data: boxes of rigid bodies, extent of the scene, scales of arrows and colours, and one output time
+//! as a small message. Nothing here knows of a viewer.
+
+use super::frame::OutputFrame;
+use super::plan::{BodyBox, OutputPlan};
+use super::surface::Surface;
+use super::tracker::Event;
+use crate::dynamics::Workspace;
+use crate::dynamics::sweep::pose_outward::pose_outward;
+use crate::dynamics::world::{WorldFrame, hinge_frame, world_frames};
+use crate::integrate::Sample;
+use crate::model::{Body, BodyKind, State, System};
+use crate::spatial::rotation::quaternion_of_matrix;
+use crate::spatial::shift::{angular, linear};
+use nalgebra::{Matrix3, SymmetricEigen, Vector3, Vector6};
+use std::ops::Range;
+use std::sync::Arc;
+
+/// A box on a body, in axes of its frame B.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BoxShape {
+    /// m.
+    pub center: [f32; 3],
+    /// m.
+    pub half_size: [f32; 3],
+    /// `[w, x, y, z]`.
+    pub quaternion: [f64; 4],
+}
+
+/// A body as pictures show it.
+#[derive(Debug, Clone)]
+pub struct BodyPicture {
+    /// Name of the body.
+    pub name: String,
+    /// Of a rigid body.
+    pub shape: Option<BoxShape>,
+    /// Of a flexible body, if the plan has its surface.
+    pub surface: Option<SurfacePicture>,
+    /// Modal coordinates in the state.
+    pub modes: Range<usize>,
+    /// Names of the modes, with frequencies.
+    pub mode_names: Vec<String>,
+}
+
+/// A surface as pictures show it.
+#[derive(Debug, Clone)]
+pub struct SurfacePicture {
+    /// Mesh and shapes.
+    pub surface: Arc<Surface>,
+    /// True if coloured by stress.
+    pub stress: bool,
+    /// Pa.
+    pub stress_limit: Option<f64>,
+}
+
+/// A hinge whose load pictures show.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HingePicture {
+    /// Name of the hinge.
+    pub name: String,
+    /// Index of the body it carries.
+    pub body: usize,
+    /// Who acts on whom.
+    pub side: String,
+    /// Axes of the components.
+    pub frame: String,
+    /// N m.
+    pub moment_limit: Option<f64>,
+    /// N.
+    pub force_limit: Option<f64>,
+}
+
+/// All that stays the same over a run.
+#[derive(Debug, Clone)]
+pub struct Picture {
+    /// Name of the scene.
+    pub scene: String,
+    /// In the order of the system.
+    pub bodies: Vec<BodyPicture>,
+    /// In the order of the plan's loaded hinges.
+    pub hinges: Vec<HingePicture>,
+    /// Factor on the deformation.
+    pub deformation_scale: f64,
+    /// Centre (m, inertial axes) of everything at the start.
+    pub center: [f64; 3],
+    /// Radius (m) around it.
+    pub radius: f64,
+}
+
+impl Picture {
+    /// The picture of `plan`, framed at `start`.
+    #[must_use]
+    pub fn new(system: &System, plan: &OutputPlan, start: &State) -> Self {
+        let bodies: Vec<_> = system.bodies.iter().enumerate().map(|(k, body)| body_picture(plan, k, body)).collect();
+        let hinge = |body: usize| {
+            let (moment_limit, force_limit) = plan.hinge_limits(body);
+            let owner = &system.bodies[body];
+            let (side, frame) = (super::channels::load_side(system, owner), super::channels::load_frame(owner));
+            HingePicture { name: owner.hinge.name.clone(), body, side, frame, moment_limit, force_limit }
+        };
+        let (center, radius) = extent(system, &bodies, start);
+        Self {
+            scene: plan.scene_name.clone(),
+            hinges: plan.loaded_hinges().into_iter().map(hinge).collect(),
+            bodies,
+            deformation_scale: plan.deformation_scale,
+            center,
+            radius,
+        }
+    }
+}
+
+fn body_picture(plan: &OutputPlan, k: usize, body: &Body) -> BodyPicture {
+    let shape = match &body.kind {
+        BodyKind::Flexible(_) => None,
+        BodyKind::Rigid(_) => plan.boxes.iter().find(|b| b.body == k).map(explicit_box).or_else(|| equivalent_box(body)),
+    };
+    let surface = plan.surfaces.iter().find(|s| s.body == k).map(|s| SurfacePicture {
+        surface: Arc::clone(&s.surface),
+        stress: s.stress,
+        stress_limit: plan.stress_limit(k),
+    });
+    let mode_names = body.flexible().map_or_else(Vec::new, |flexible| {
+        let frequency = flexible.stiffness.iter().map(|k| k.max(0.0).sqrt() / std::f64::consts::TAU);
+        flexible.mode_numbers.iter().zip(frequency).map(|(n, f)| format!("mode {n}, {f:.3} Hz ({})", super::channels::MODAL_UNIT)).collect()
+    });
+    BodyPicture { name: body.name.clone(), shape, surface, modes: body.modal_range(), mode_names }
+}
+
+fn explicit_box(size: &BodyBox) -> BoxShape {
+    let half_size = size.size.map(|x| (0.5 * x) as f32);
+    BoxShape { center: size.center.map(|x| x as f32), half_size, quaternion: [1.0, 0.0, 0.0, 0.0] }
+}
+
+/// The homogeneous cuboid of the same mass and inertia; none for a body without mass. Edges below 2 % of the longest are drawn as that.
+fn equivalent_box(body: &Body) -> Option<BoxShape> {
+    let BodyKind::Rigid(inertia) = &body.kind else { return None };
+    let mass = inertia.translational[(0, 0)];
+    if mass <= 0.0 {
+        return None;
+    }
+    let c = Vector3::new(inertia.coupling[(2, 1)], inertia.coupling[(0, 2)], inertia.coupling[(1, 0)]) / mass;
+    let about_center = inertia.rotational - (Matrix3::identity() * c.norm_squared() - c * c.transpose()) * mass;
+    // to the axes of B, so that a body with principal axes there gets a box along them
+    let to_b = body.frame_rotation.transpose();
+    let eigen = SymmetricEigen::new(to_b * about_center * body.frame_rotation);
+    let (mut axes, moments) = (eigen.eigenvectors, eigen.eigenvalues);
+    if axes.determinant() < 0.0 {
+        axes.column_mut(2).neg_mut();
+    }
+    let edges = moments.map(|moment| (6.0 * (moments.sum() - 2.0 * moment) / mass).max(0.0).sqrt());
+    let smallest = (0.02 * edges.max()).max(1e-3);
+    let center = to_b * (c - body.frame_position);
+    Some(BoxShape {
+        center: [center.x as f32, center.y as f32, center.z as f32],
+        half_size: [0, 1, 2].map(|i| (0.5 * edges[i].max(smallest)) as f32),
+        quaternion: quaternion_of_matrix(&axes),
+    })
+}
+
+/// Centre and radius of all surfaces, boxes and hinges.
+fn extent(system: &System, bodies: &[BodyPicture], start: &State) -> ([f64; 3], f64) {
+    let mut workspace = Workspace::new(system);
+    let mut frames = vec![WorldFrame::default(); system.bodies.len()];
+    pose_outward(system, start, &mut workspace.pose);
+    world_frames(system, &workspace.pose, &mut frames);
+    let (mut low, mut high) = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
+    for (k, (body, picture)) in system.bodies.iter().zip(bodies).enumerate() {
+        let frame = frames[k].body_frame(body);
+        let mut take = |x: Vector3<f64>| {
+            let x = frame.position + frame.rotation * x;
+            (low, high) = (low.inf(&x), high.sup(&x));
+        };
+        take(Vector3::zeros());
+        if let Some(shape) = &picture.shape {
+            let rotation = crate::spatial::rotation::matrix_of_quaternion(&shape.quaternion);
+            let (center, half) = (Vector3::from(shape.center.map(f64::from)), shape.half_size.map(f64::from));
+            for corner in 0..8 {
+                let side = |i: usize| if corner >> i & 1 == 0 { half[i] } else { -half[i] };
+                take(center + rotation * Vector3::new(side(0), side(1), side(2)));
+            }
+        }
+        picture.surface.iter().flat_map(|s| &s.surface.points).for_each(|point| take(Vector3::from(*point)));
+    }
+    let (center, radius) = ((low + high) * 0.5, 0.5 * (high - low).norm());
+    if radius.is_finite() { (center.into(), radius.max(1e-3)) } else { ([0.0; 3], 1.0) }
+}
+
+/// A load in a picture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LoadSnapshot {
+    /// O in inertial axes (m).
+    pub point: [f64; 3],
+    /// Inertial axes (N m).
+    pub moment_world: [f64; 3],
+    /// Inertial axes (N).
+    pub force_world: [f64; 3],
+    /// (moment; force) in O axes.
+    pub load: Vector6<f64>,
+}
+
+/// One output time, small enough to be handed to another thread.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Snapshot {
+    /// s.
+    pub time: f64,
+    /// Position (m) and quaternion of every body frame B in inertial axes.
+    pub poses: Vec<([f64; 3], [f64; 4])>,
+    /// Loads at the picture's hinges.
+    pub loads: Vec<LoadSnapshot>,
+    /// Modal coordinates of all bodies.
+    pub modal_position: Vec<f64>,
+    /// What became known.
+    pub events: Vec<(bool, String)>,
+}
+
+impl Snapshot {
+    /// The snapshot of `sample` for the hinges of `picture`.
+    #[must_use]
+    pub fn of(hinges: &[usize], sample: &Sample<'_>, frame: &OutputFrame, events: &[Event]) -> Self {
+        let Sample { system, state, workspace, .. } = *sample;
+        let pose = |(body, frame): (&Body, &WorldFrame)| {
+            let frame = frame.body_frame(body);
+            (frame.position.into(), quaternion_of_matrix(&frame.rotation))
+        };
+        let load = |(&k, load): (&usize, &Vector6<f64>)| {
+            let at = hinge_frame(&system.bodies[k], &workspace.pose, k, &frame.frames);
+            let turned = |x: Vector3<f64>| (at.rotation * x).into();
+            LoadSnapshot { point: at.position.into(), moment_world: turned(angular(load)), force_world: turned(linear(load)), load: *load }
+        };
+        Self {
+            time: state.time,
+            poses: system.bodies.iter().zip(&frame.frames).map(pose).collect(),
+            loads: hinges.iter().zip(&frame.loads).map(load).collect(),
+            modal_position: state.modal_position.clone(),
+            events: events.iter().map(|e| (matches!(e, Event::Exceeded(_)), e.text())).collect(),
+        }
+    }
+}
+
+/// A scale that is a limit, or the smallest of 1, 2, 5, 10, ... above everything seen so far, so that it changes seldom.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Scale {
+    limit: bool,
+    /// The value that fills the scale; zero before anything was seen.
+    pub full: f64,
+}
+
+impl Scale {
+    /// A scale that ends at `limit`, or grows.
+    #[must_use]
+    pub fn new(limit: Option<f64>) -> Self {
+        Self { limit: limit.is_some(), full: limit.unwrap_or(0.0) }
+    }
+
+    /// True if the scale ends at a limit.
+    #[must_use]
+    pub fn is_limit(&self) -> bool {
+        self.limit
+    }
+
+    /// Takes in a value; true if the scale had to change.
+    pub fn cover(&mut self, value: f64) -> bool {
+        if self.limit || value <= self.full || !value.is_finite() {
+            return false;
+        }
+        let decade = 10.0_f64.powf(value.log10().floor());
+        self.full = [1.0, 2.0, 5.0, 10.0].into_iter().map(|m| m * decade).find(|full| *full >= value).unwrap_or(value);
+        true
+    }
+
+    /// The share of the scale that `value` fills.
+    #[must_use]
+    pub fn share(&self, value: f64) -> f64 {
+        if self.full > 0.0 { value / self.full } else { 0.0 }
+    }
+}
+
+/// Colours from none to full stress.
+#[derive(Debug, Clone)]
+pub struct ColourMap(Vec<[u8; 3]>);
+
+impl Default for ColourMap {
+    fn default() -> Self {
+        Self((0..256_usize).map(|i| colorous::VIRIDIS.eval_rational(i, 256).as_array()).collect())
+    }
+}
+
+impl ColourMap {
+    /// Name for legends.
+    pub const NAME: &'static str = "viridis";
+
+    /// Colour of the share `x` from 0 to 1.
+    #[must_use]
+    pub fn colour(&self, x: f64) -> [u8; 3] {
+        self.0[(x.clamp(0.0, 1.0) * 255.0) as usize]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn scales_grow_in_steps_and_limits_stay() {
+        let mut scale = Scale::new(None);
+        assert!(scale.cover(0.013) && (scale.full - 0.02).abs() < 1e-15 && !scale.cover(0.019));
+        assert!(scale.cover(430.0) && (scale.full - 500.0).abs() < 1e-9 && (scale.share(250.0) - 0.5).abs() < 1e-12);
+        let mut limit = Scale::new(Some(30.0));
+        assert!(!limit.cover(400.0) && limit.full == 30.0);
+    }
+
+    #[test]
+    fn colours_run_from_dark_to_bright_and_saturate() {
+        let map = ColourMap::default();
+        let light = |x| map.colour(x).iter().map(|&c| u32::from(c)).sum::<u32>();
+        assert!(light(0.0) < light(0.5) && light(0.5) < light(1.0));
+        assert_eq!(map.colour(7.0), map.colour(1.0));
+        assert_eq!(map.colour(f64::NAN), map.colour(0.0));
+    }
+}

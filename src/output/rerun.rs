@@ -1,60 +1,411 @@
-//! The viewer stream.
-use super::frame::OutputFrame;
+//! The Rerun stream: what is logged where, and the layout in which a viewer opens it. The only file that knows the Rerun SDK.
+//!
+//! Mesh topology, boxes, names and units are logged once as static data; positions and colours follow at output times through partial
+//! updates, since static data would hide what is logged later under the same component. The SDK waits for ever if nobody takes its data, so
+//! every flush here has a time limit, and a stream that failed is not dropped but left to the end of the process.
+
+use super::picture::{BodyPicture, ColourMap, HingePicture, LoadSnapshot, Picture, Scale, Snapshot};
 use super::plan::OutputPlan;
-use super::tracker::Event;
-use crate::integrate::Sample;
-use crate::model::System;
-use std::path::PathBuf;
+use super::viewer::{FrameLog, ViewerError, ViewerStream, ViewerTarget, free_port, probe, spawn};
+use crate::model::{State, System};
+use rerun::blueprint::components::{PanelState, PlayState};
+use rerun::blueprint::{
+    Blueprint, BlueprintPanel, ContainerLike, Grid, Horizontal, SelectionPanel, Spatial3DView, Tabs, TextDocumentView, TextLogView,
+    TimePanel, TimeSeriesView, Vertical,
+};
+use rerun::external::re_log_types::{BlueprintActivationCommand, EntityPath, EntityPathPart, LogMsg};
+use rerun::external::re_sdk_types::blueprint::archetypes::EyeControls3D;
+use rerun::{RecordingStream, RecordingStreamBuilder, RecordingStreamError, RecordingStreamResult};
+use std::path::Path;
+use std::time::Duration;
 
-/// Where the stream goes.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum ViewerTarget {
-    /// A recording on disk.
-    Save(PathBuf),
-    /// A viewer of its own; found on PATH or in `.venv/bin` if no executable is named.
-    Spawn {
-        /// The viewer to start.
-        executable: Option<PathBuf>,
-    },
-    /// A viewer that listens, as `rerun+http://HOST:PORT/proxy`.
-    Connect {
-        /// Address.
-        url: String,
-    },
-    /// A web page served by this process.
-    Web {
-        /// Port of the page.
-        port: u16,
-        /// Port of the data.
-        grpc_port: u16,
-    },
+/// Name under which viewers keep the layout.
+const APPLICATION: &str = "pliant";
+/// Timeline of simulated time (s).
+pub const TIMELINE: &str = "sim_time";
+/// How long a flush may take (s).
+const FLUSH: Duration = Duration::from_secs(20);
+/// Length of the longest arrow relative to the radius of the scene.
+const ARROW: f64 = 0.45;
+/// Colours of moments and forces in the 3D view, and of x, y, z, magnitude and limit in plots.
+const MOMENT: [u8; 3] = [255, 140, 0];
+const FORCE: [u8; 3] = [0, 200, 255];
+const SERIES: [[u8; 3]; 5] = [[230, 80, 60], [80, 190, 90], [80, 130, 240], [230, 230, 230], [255, 200, 0]];
+/// Pa to MPa.
+const MEGA: f64 = 1e-6;
+
+/// Opens a stream, or says why there is none.
+///
+/// # Errors
+/// If the file cannot be made, no viewer listens or can be started, or a port is taken.
+pub fn open(target: &ViewerTarget, plan: &OutputPlan, system: &System, start: &State) -> Result<ViewerStream, ViewerError> {
+    const AGAIN: &str = "start the viewer again, or save a recording instead";
+    let builder = RecordingStreamBuilder::new(APPLICATION).recording_name(plan.scene_name.as_str());
+    let setup = |e: RecordingStreamError| ViewerError::Setup { cause: e.to_string() };
+    let (recording, shown, remedy, end) = match target {
+        ViewerTarget::Save(file) => {
+            let refused = |e: std::io::Error| ViewerError::Create { file: file.clone(), cause: e.to_string() };
+            std::fs::File::create(file).map_err(refused)?;
+            let recording = builder.save(file).map_err(setup)?;
+            (recording, file.display().to_string(), "look for a full disk", End::File(file.clone()))
+        }
+        ViewerTarget::Spawn { executable } => {
+            let url = spawn(executable.as_deref())?;
+            (builder.connect_grpc_opts(url.as_str()).map_err(setup)?, url, AGAIN, End::Viewer)
+        }
+        ViewerTarget::Connect { url } => {
+            let url = probe(url)?;
+            (builder.connect_grpc_opts(url.as_str()).map_err(setup)?, url, AGAIN, End::Viewer)
+        }
+        ViewerTarget::Web { port, grpc_port } => {
+            free_port(*port)?;
+            free_port(*grpc_port)?;
+            let recording = builder.serve_grpc_opts("127.0.0.1", *grpc_port, rerun::ServerOptions::default()).map_err(setup)?;
+            let data = format!("rerun+http://127.0.0.1:{grpc_port}/proxy");
+            let config = rerun::web_viewer::WebViewerConfig {
+                bind_ip: "127.0.0.1".into(),
+                web_port: (*port).into(),
+                connect_to: vec![data],
+                open_browser: false,
+                ..Default::default()
+            };
+            let page = rerun::serve_web_viewer(config).map_err(|e| ViewerError::Port { port: *port, cause: e.to_string() })?;
+            page.detach();
+            let url = format!("http://127.0.0.1:{port}/?url=rerun%2Bhttp%3A%2F%2F127.0.0.1%3A{grpc_port}%2Fproxy");
+            (recording, url, AGAIN, End::Server)
+        }
+    };
+    stream(recording, shown, remedy, end, plan, system, start)
 }
 
-/// Why there is no stream.
-#[derive(Debug, thiserror::Error)]
-#[error("no viewer")]
-pub struct ViewerError;
-impl ViewerError {
-    pub fn frames(&self) -> u64 {
-        0
+/// A stream into a recording that the caller made.
+///
+/// # Errors
+/// If the first messages cannot be logged.
+pub fn into_recording(recording: RecordingStream, plan: &OutputPlan, system: &System, start: &State) -> Result<ViewerStream, ViewerError> {
+    stream(recording, "recording".into(), "look at the recording's sink", End::Viewer, plan, system, start)
+}
+
+fn stream(
+    recording: RecordingStream,
+    target: String,
+    remedy: &'static str,
+    end: End,
+    plan: &OutputPlan,
+    system: &System,
+    start: &State,
+) -> Result<ViewerStream, ViewerError> {
+    recording.set_log_time_enabled(false);
+    recording.set_log_tick_enabled(false);
+    let picture = Picture::new(system, plan, start);
+    let log = RerunLog::new(recording, picture, end).map_err(|e| ViewerError::Setup { cause: e.to_string() })?;
+    ViewerStream::start(log, target, remedy, plan.loaded_hinges())
+}
+
+/// What the end of a stream has to see to.
+#[derive(Debug)]
+enum End {
+    File(std::path::PathBuf),
+    Viewer,
+    Server,
+}
+
+fn path(parts: &[&str]) -> EntityPath {
+    EntityPath::new(parts.iter().map(|part| EntityPathPart::new(*part)).collect())
+}
+
+/// Entity of a body; `hinges` under `world` is taken.
+fn body_path(name: &str) -> EntityPath {
+    if name == "hinges" { path(&["world", "hinges (body)"]) } else { path(&["world", name]) }
+}
+
+fn below(parent: &EntityPath, part: &str) -> EntityPath {
+    parent.join(&path(&[part]))
+}
+
+fn single(x: [f64; 3]) -> [f32; 3] {
+    x.map(|x| x as f32)
+}
+
+struct RerunLog {
+    recording: RecordingStream,
+    picture: Picture,
+    end: End,
+    colours: ColourMap,
+    points: Vec<Vec<[f32; 3]>>,
+    values: Vec<Vec<f32>>,
+    stress: Scale,
+    moment: Scale,
+    force: Scale,
+    begun: bool,
+}
+
+impl RerunLog {
+    fn new(recording: RecordingStream, picture: Picture, end: End) -> RecordingStreamResult<Self> {
+        let largest = |limits: &mut dyn Iterator<Item = f64>| limits.reduce(f64::max);
+        let stress = largest(&mut picture.bodies.iter().filter_map(|b| b.surface.as_ref()?.stress_limit));
+        let moment = largest(&mut picture.hinges.iter().filter_map(|h| h.moment_limit));
+        let force = largest(&mut picture.hinges.iter().filter_map(|h| h.force_limit));
+        let room = |body: &BodyPicture| body.surface.as_ref().map_or(0, |s| s.surface.points.len());
+        let log = Self {
+            points: picture.bodies.iter().map(|b| vec![[0.0; 3]; room(b)]).collect(),
+            values: picture.bodies.iter().map(|b| vec![0.0; room(b)]).collect(),
+            colours: ColourMap::default(),
+            stress: Scale::new(stress),
+            moment: Scale::new(moment),
+            force: Scale::new(force),
+            begun: false,
+            recording,
+            picture,
+            end,
+        };
+        send_blueprint(&log.recording, &log.picture)?;
+        log.log_static()?;
+        Ok(log)
+    }
+
+    /// What never changes: axes, topology, boxes, names and units.
+    fn log_static(&self) -> RecordingStreamResult<()> {
+        let rec = &self.recording;
+        rec.log_static("world", &rerun::ViewCoordinates::RIGHT_HAND_Z_UP())?;
+        for body in &self.picture.bodies {
+            let entity = body_path(&body.name);
+            if let Some(shape) = &body.shape {
+                let [w, x, y, z] = shape.quaternion.map(|q| q as f32);
+                let boxes = rerun::Boxes3D::from_centers_and_half_sizes([shape.center], [shape.half_size])
+                    .with_quaternions([rerun::Quaternion::from_xyzw([x, y, z, w])])
+                    .with_fill_mode(rerun::FillMode::Solid)
+                    .with_colors([[150_u8, 155, 165]]);
+                rec.log_static(below(&entity, "box"), &boxes)?;
+            }
+            if let Some(surface) = &body.surface {
+                let mesh = rerun::Mesh3D::update_fields().with_triangle_indices(surface.surface.triangles.iter().copied());
+                let mesh = if surface.stress { mesh } else { mesh.with_albedo_factor([90_u8, 120, 170, 255]) };
+                rec.log_static(below(&entity, "mesh"), &mesh)?;
+                if surface.stress {
+                    let names = ["von Mises peak (MPa)", "limit (MPa)"];
+                    let count = 1 + usize::from(surface.stress_limit.is_some());
+                    let names = names[..count].iter().map(|name| format!("{}: {name}", body.name));
+                    rec.log_static(path(&["stress", &body.name]), &rerun::SeriesLines::new().with_names(names))?;
+                }
+            }
+            if !body.mode_names.is_empty() {
+                let names = rerun::SeriesLines::new().with_names(body.mode_names.iter().map(String::as_str));
+                rec.log_static(path(&["modes", &body.name]), &names)?;
+            }
+        }
+        for hinge in &self.picture.hinges {
+            for (quantity, unit, limit) in [("moment", "N m", hinge.moment_limit), ("force", "N", hinge.force_limit)] {
+                let count = 4 + usize::from(limit.is_some());
+                let names = ["x", "y", "z", "magnitude", "limit"].iter().take(count).map(|part| format!("{quantity} {part} ({unit})"));
+                let series = rerun::SeriesLines::new().with_names(names).with_colors(SERIES.into_iter().take(count));
+                rec.log_static(path(&["loads", &hinge.name, quantity]), &series)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn log_frame(&mut self, snapshot: &Snapshot) -> RecordingStreamResult<()> {
+        self.recording.set_duration_secs(TIMELINE, snapshot.time);
+        let mut rescaled = !self.begun;
+        let mut peaks = vec![0.0; self.picture.bodies.len()];
+        for (k, body) in self.picture.bodies.iter().enumerate() {
+            let Some(surface) = &body.surface else { continue };
+            let eta = snapshot.modal_position.get(body.modes.clone()).unwrap_or_default();
+            surface.surface.deform(eta, self.picture.deformation_scale, &mut self.points[k]);
+            if surface.stress {
+                peaks[k] = surface.surface.point_stress(eta, &mut self.values[k]).value;
+                rescaled |= self.stress.cover(peaks[k]);
+            }
+        }
+        for load in &snapshot.loads {
+            rescaled |= self.moment.cover(load.load.fixed_rows::<3>(0).norm());
+            rescaled |= self.force.cover(load.load.fixed_rows::<3>(3).norm());
+        }
+        if rescaled {
+            self.log_legend()?;
+        }
+        self.log_bodies(snapshot, &peaks)?;
+        self.picture.hinges.iter().zip(&snapshot.loads).try_for_each(|(hinge, load)| self.log_load(hinge, load))?;
+        for (warning, text) in &snapshot.events {
+            self.log_line(text, if *warning { rerun::TextLogLevel::WARN } else { rerun::TextLogLevel::INFO })?;
+        }
+        self.begun = true;
+        Ok(())
+    }
+
+    fn log_bodies(&self, snapshot: &Snapshot, peaks: &[f64]) -> RecordingStreamResult<()> {
+        let rec = &self.recording;
+        for (k, (body, (position, [w, x, y, z]))) in self.picture.bodies.iter().zip(&snapshot.poses).enumerate() {
+            let entity = body_path(&body.name);
+            let turn = rerun::Quaternion::from_xyzw([*x, *y, *z, *w].map(|q| q as f32));
+            rec.log(entity.clone(), &rerun::Transform3D::from_translation_rotation(single(*position), turn))?;
+            if let Some(surface) = &body.surface {
+                let mesh = rerun::Mesh3D::update_fields().with_vertex_positions(self.points[k].iter().copied());
+                let mesh = if surface.stress {
+                    let full = self.stress.full;
+                    let share = |value: &f32| if full > 0.0 { f64::from(*value) / full } else { 0.0 };
+                    mesh.with_vertex_colors(self.values[k].iter().map(|value| self.colours.colour(share(value))))
+                } else {
+                    mesh
+                };
+                rec.log(below(&entity, "mesh"), &mesh)?;
+                if surface.stress {
+                    let values = std::iter::once(peaks[k]).chain(surface.stress_limit).map(|pascal| pascal * MEGA);
+                    rec.log(path(&["stress", &body.name]), &rerun::Scalars::new(values))?;
+                }
+            }
+            if !body.mode_names.is_empty() {
+                let eta = snapshot.modal_position.get(body.modes.clone()).unwrap_or_default();
+                rec.log(path(&["modes", &body.name]), &rerun::Scalars::new(eta.iter().copied()))?;
+            }
+        }
+        Ok(())
+    }
+
+    fn log_load(&self, hinge: &HingePicture, load: &LoadSnapshot) -> RecordingStreamResult<()> {
+        let length = ARROW * self.picture.radius;
+        let parts = [
+            ("moment", load.moment_world, 0, self.moment, MOMENT, hinge.moment_limit),
+            ("force", load.force_world, 3, self.force, FORCE, hinge.force_limit),
+        ];
+        for (quantity, vector, row, scale, colour, limit) in parts {
+            let arrow = vector.map(|x| (length * scale.share(x)) as f32);
+            let arrows = rerun::Arrows3D::from_vectors([arrow])
+                .with_origins([single(load.point)])
+                .with_colors([colour])
+                .with_radii([(0.012 * self.picture.radius) as f32]);
+            self.recording.log(path(&["world", "hinges", &hinge.name, quantity]), &arrows)?;
+            let components = load.load.fixed_rows::<3>(row);
+            let values = components.iter().copied().chain([components.norm()]).chain(limit);
+            self.recording.log(path(&["loads", &hinge.name, quantity]), &rerun::Scalars::new(values))?;
+        }
+        Ok(())
+    }
+
+    /// The ranges in use, as a document that a view shows and as a log line.
+    fn log_legend(&self) -> RecordingStreamResult<()> {
+        let basis = |scale: &Scale| if scale.is_limit() { "the limit" } else { "above the largest so far" };
+        let stress =
+            format!("von Mises stress, {}: dark 0 to bright {} MPa ({})", ColourMap::NAME, self.stress.full * MEGA, basis(&self.stress));
+        let moment = format!("moment arrows (orange): full length {} N m ({})", self.moment.full, basis(&self.moment));
+        let force = format!("force arrows (blue): full length {} N ({})", self.force.full, basis(&self.force));
+        let Picture { scene, deformation_scale, .. } = &self.picture;
+        let text = format!(
+            "## {scene}\n- {stress}\n- {moment}\n- {force}\n- deformation drawn times {deformation_scale}\n- loads: by parent on child, moment about O; \
+             plots in O axes of the hinge\n"
+        );
+        self.recording.log("legend", &rerun::TextDocument::from_markdown(text))?;
+        self.log_line(&format!("scales: {stress}; {moment}; {force}"), rerun::TextLogLevel::INFO)
+    }
+
+    fn log_line(&self, text: &str, level: &str) -> RecordingStreamResult<()> {
+        self.recording.log("events", &rerun::TextLog::new(text).with_level(level))
     }
 }
-#[derive(Debug)]
-pub struct ViewerSummary {
-    pub frames: u64,
+
+impl FrameLog for RerunLog {
+    fn frame(&mut self, snapshot: &Snapshot) -> Result<(), String> {
+        self.log_frame(snapshot).map_err(|e| e.to_string())
+    }
+
+    fn note(&mut self, time: f64, text: &str) -> Result<(), String> {
+        self.recording.set_duration_secs(TIMELINE, time);
+        self.log_line(text, rerun::TextLogLevel::ERROR).map_err(|e| e.to_string())
+    }
+
+    fn close(self) -> Result<(), String> {
+        let Self { recording, end, .. } = self;
+        if let Err(error) = recording.flush_with_timeout(FLUSH) {
+            // dropping would wait for a viewer that is gone
+            std::mem::forget(recording);
+            return Err(error.to_string());
+        }
+        match end {
+            // the page and its data last as long as the process
+            End::Server => std::mem::forget(recording),
+            End::Viewer => drop(recording),
+            End::File(file) => {
+                drop(recording);
+                if !ends_in_footer(&file) {
+                    return Err("the file has no end".into());
+                }
+            }
+        }
+        Ok(())
+    }
 }
-#[derive(Debug)]
-pub struct RerunStream {}
-impl RerunStream {
-    pub fn open(_: ViewerTarget, _: &OutputPlan, _: &System) -> Result<Self, ViewerError> {
-        Err(ViewerError)
-    }
-    pub fn target(&self) -> &str {
-        ""
-    }
-    pub fn send(&mut self, _: &Sample<'_>, _: &OutputFrame, _: &[Event]) {}
-    pub fn note(&mut self, _: f64, _: &str) {}
-    pub fn finish(self) -> Result<ViewerSummary, ViewerError> {
-        Err(ViewerError)
-    }
+
+/// True if the last bytes of a recording are its footer, which is written when it is closed.
+fn ends_in_footer(file: &Path) -> bool {
+    use std::io::{Read, Seek, SeekFrom};
+    let mut tail = Vec::new();
+    let read = std::fs::File::open(file).and_then(|mut f| {
+        let length = f.metadata()?.len();
+        f.seek(SeekFrom::Start(length.saturating_sub(64)))?;
+        f.read_to_end(&mut tail)
+    });
+    read.is_ok() && tail.windows(4).any(|word| word == b"FOOT")
+}
+
+/// Most hinges whose plots are all open at once; with more, each has a tab.
+const OPEN_HINGES: usize = 3;
+
+/// The layout: the whole system on the left above legend and events, plots of every load, stress and mode on the right.
+///
+/// The blueprint builder has no camera, but a camera is plain data at `<view>/EyeControls3D` in the blueprint's store.
+fn send_blueprint(recording: &RecordingStream, picture: &Picture) -> RecordingStreamResult<()> {
+    let view: ContainerLike = Spatial3DView::new(picture.scene.as_str()).with_origin("/world").into();
+    let camera = if let ContainerLike::View(view) = &view { view.blueprint_path() } else { EntityPath::root() };
+    let plot = |name: String, origin: EntityPath| -> ContainerLike { TimeSeriesView::new(name).with_origin(origin).into() };
+    let plots_of = |hinge: &HingePicture| {
+        let of = |quantity: &str, unit| {
+            plot(format!("{}: {quantity} {}, {unit}", hinge.name, hinge.side), path(&["loads", &hinge.name, quantity]))
+        };
+        [of("moment", "N m"), of("force", "N")]
+    };
+    let loads: Option<ContainerLike> = match picture.hinges.len() {
+        0 => None,
+        1..=OPEN_HINGES => Some(Grid::new(picture.hinges.iter().flat_map(plots_of)).with_grid_columns(2).into()),
+        _ => Some(Tabs::new(picture.hinges.iter().map(|h| Vertical::new(plots_of(h)).with_name(h.name.as_str()).into())).into()),
+    };
+    let stressed = picture.bodies.iter().any(|b| b.surface.as_ref().is_some_and(|s| s.stress));
+    let stress = stressed.then(|| plot("von Mises peak, MPa".into(), path(&["stress"])));
+    let modes: Vec<_> = picture.bodies.iter().filter(|b| !b.mode_names.is_empty()).collect();
+    let modes = modes.iter().map(|b| plot(format!("{}: modal coordinates", b.name), path(&["modes", &b.name]))).collect::<Vec<_>>();
+    let modes: Option<ContainerLike> = if modes.is_empty() { None } else { Some(Tabs::new(modes).into()) };
+    let lower: Vec<ContainerLike> = stress.into_iter().chain(modes).collect();
+    let lower: Option<ContainerLike> = if lower.is_empty() { None } else { Some(Horizontal::new(lower).into()) };
+    let shares = if loads.is_some() { vec![picture.hinges.len().min(OPEN_HINGES) as f32, 1.0] } else { vec![1.0] };
+    let right = Vertical::new(loads.into_iter().chain(lower)).with_row_shares(shares);
+    let texts = Horizontal::new([
+        TextDocumentView::new("legend").with_origin("/legend").into(),
+        TextLogView::new("events").with_origin("/events").into(),
+    ]);
+    let left = Vertical::new([view, texts.into()]).with_row_shares(vec![3.0, 1.0]);
+    let time = TimePanel::new().with_timeline(TIMELINE).with_state(PanelState::Collapsed).with_play_state(PlayState::Following);
+    let blueprint = Blueprint::new(Horizontal::new([left.into(), right.into()]).with_column_shares(vec![1.0, 1.0]))
+        .with_time_panel(time)
+        .with_blueprint_panel(BlueprintPanel::from_state(PanelState::Hidden))
+        .with_selection_panel(SelectionPanel::from_state(PanelState::Hidden))
+        .with_auto_views(false)
+        .with_auto_layout(false);
+
+    let (scratch, store) = RecordingStreamBuilder::new(APPLICATION).memory()?;
+    blueprint.send(&scratch, Default::default())?;
+    let messages = store.take().into_iter();
+    let mut messages: Vec<LogMsg> = messages
+        .filter(|m| m.store_id().kind() == rerun::StoreKind::Blueprint && !matches!(m, LogMsg::BlueprintActivationCommand(_)))
+        .collect();
+    let Some(id) = messages.first().map(|m| m.store_id().clone()) else { return Ok(()) };
+    let (extra, store) = RecordingStreamBuilder::from_store_id(&id).memory()?;
+    extra.set_time_sequence("blueprint", 0);
+    let away = [0.55, -1.25, 0.8].map(|x| 1.05 * x * picture.radius);
+    let eye = std::array::from_fn::<f64, 3, _>(|i| picture.center[i] + away[i]);
+    let controls =
+        EyeControls3D::new().with_position(single(eye)).with_look_target(single(picture.center)).with_eye_up([0.0_f32, 0.0, 1.0]);
+    extra.log(below(&camera, "EyeControls3D"), &controls)?;
+    messages.extend(store.take().into_iter().filter(|m| matches!(m, LogMsg::ArrowMsg(..))));
+    recording.send_blueprint(messages, BlueprintActivationCommand { blueprint_id: id, make_active: true, make_default: true });
+    Ok(())
 }

@@ -4,13 +4,13 @@
 
 use super::evaluation::Evaluation;
 use super::frame::FrameEvaluator;
+use super::picture::Snapshot;
 use super::plan::{OutputPlan, PlanError};
 use super::report::{OutcomeRecord, RunReport, Written};
-#[cfg(feature = "rerun")]
-use super::rerun::{RerunStream, ViewerError, ViewerTarget};
 #[cfg(feature = "hdf5")]
 use super::results::ResultsWriter;
 use super::tracker::Tracker;
+use super::viewer::ViewerStream;
 use crate::integrate::{Flow, Observer, Outcome, Sample, Summary};
 #[cfg(feature = "hdf5")]
 use crate::io::ResultsError;
@@ -26,8 +26,7 @@ pub struct OutputSet<'s> {
     tracker: Tracker,
     #[cfg(feature = "hdf5")]
     results: Option<ResultsWriter>,
-    #[cfg(feature = "rerun")]
-    viewer: Option<RerunStream>,
+    viewer: Option<ViewerStream>,
     written: Vec<Written>,
 }
 
@@ -45,7 +44,6 @@ impl<'s> OutputSet<'s> {
             plan,
             #[cfg(feature = "hdf5")]
             results: None,
-            #[cfg(feature = "rerun")]
             viewer: None,
             written: Vec::new(),
         })
@@ -61,14 +59,25 @@ impl<'s> OutputSet<'s> {
         Ok(())
     }
 
-    /// Adds a viewer stream.
+    /// Opens a viewer stream that shows the system framed as it is at `start`.
     ///
     /// # Errors
     /// If no viewer can be reached or the file cannot be made.
     #[cfg(feature = "rerun")]
-    pub fn open_viewer(&mut self, target: ViewerTarget) -> Result<(), ViewerError> {
-        self.viewer = Some(RerunStream::open(target, &self.plan, self.system)?);
+    pub fn open_viewer(&mut self, target: &super::ViewerTarget, start: &crate::model::State) -> Result<(), super::ViewerError> {
+        self.add_viewer(super::rerun::open(target, &self.plan, self.system, start)?);
         Ok(())
+    }
+
+    /// Adds a viewer stream that was opened for this plan.
+    pub fn add_viewer(&mut self, stream: ViewerStream) {
+        self.viewer = Some(stream);
+    }
+
+    /// Path or address of the viewer stream.
+    #[must_use]
+    pub fn viewer_target(&self) -> Option<&str> {
+        self.viewer.as_ref().map(ViewerStream::target)
     }
 
     /// The plan.
@@ -93,7 +102,6 @@ impl<'s> OutputSet<'s> {
     pub fn finish(mut self, summary: &Summary, integrator: &str, wall: Duration, left_out: Vec<String>) -> RunReport {
         #[cfg(feature = "hdf5")]
         self.finish_results(summary);
-        #[cfg(feature = "rerun")]
         self.finish_viewer(summary);
         let end = summary.end.is_finite().then(|| Evaluation::of(self.system, &summary.end).ok()).flatten();
         RunReport {
@@ -123,7 +131,6 @@ impl<'s> OutputSet<'s> {
         }
     }
 
-    #[cfg(feature = "rerun")]
     fn finish_viewer(&mut self, summary: &Summary) {
         if let Some(mut viewer) = self.viewer.take() {
             if let Outcome::Failed(failure) = &summary.outcome {
@@ -151,9 +158,9 @@ impl Observer for OutputSet<'_> {
             self.written.push(Written { kind: "results", target, frames, problem: Some(error.to_string()) });
             self.results = None;
         }
-        #[cfg(feature = "rerun")]
         if let Some(viewer) = &mut self.viewer {
-            viewer.send(sample, frame, &self.tracker.events);
+            let snapshot = Snapshot::of(viewer.hinges(), sample, frame, &self.tracker.events);
+            viewer.send(snapshot);
         }
         Flow::Continue
     }

@@ -1,0 +1,357 @@
+//! Where a viewer stream goes, what can be wrong with it, and the thread behind a bounded channel that feeds it.
+//!
+//! The solver hands over small snapshots. If the viewer is too slow it waits for room, at most [`PATIENCE`]; after that the stream is
+//! given up, the run goes on and the report says so. Nothing waits without bound: ports are probed before anything connects, and closing
+//! has a time limit.
+
+use super::picture::Snapshot;
+use crossbeam_channel::{Receiver, RecvTimeoutError, SendTimeoutError, Sender, bounded};
+use std::net::{SocketAddr, TcpListener, TcpStream, ToSocketAddrs};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+use thiserror::Error;
+
+/// Version of the viewer that understands the stream.
+pub const VIEWER_VERSION: &str = "0.36.3";
+/// Port on which viewers listen unless told otherwise.
+pub const VIEWER_PORT: u16 = 9876;
+/// How long the solver waits for room (s).
+pub const PATIENCE: Duration = Duration::from_secs(10);
+/// How long the end of a run waits for the viewer (s).
+const CLOSING: Duration = Duration::from_secs(30);
+/// How long a probe of a port takes at most (s).
+const PROBE: Duration = Duration::from_secs(2);
+/// How long a viewer may take to start (s).
+const START: Duration = Duration::from_secs(20);
+/// Output times on their way to the thread.
+const IN_FLIGHT: usize = 16;
+
+/// Where the stream goes.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum ViewerTarget {
+    /// A recording on disk.
+    Save(PathBuf),
+    /// A viewer of its own; found on PATH or in `.venv/bin` of the current directory if no executable is named.
+    Spawn {
+        /// The viewer to start.
+        executable: Option<PathBuf>,
+    },
+    /// A viewer that listens, as `rerun+http://HOST:PORT/proxy`, `HOST:PORT` or `HOST`.
+    Connect {
+        /// Address.
+        url: String,
+    },
+    /// A page served by this process, and by nothing else: it lasts as long as the process.
+    Web {
+        /// Port of the page.
+        port: u16,
+        /// Port of the data.
+        grpc_port: u16,
+    },
+}
+
+/// Why there is no stream, or no longer.
+#[derive(Debug, Error, Clone, PartialEq, Eq)]
+pub enum ViewerError {
+    /// Nobody listens.
+    #[error(
+        "no viewer listens at {url} ({cause}); start one with `rerun` (version {VIEWER_VERSION}: pip install rerun-sdk=={VIEWER_VERSION}) and check \
+         host and port, or save a recording instead"
+    )]
+    NoListener {
+        /// Address.
+        url: String,
+        /// What the system says.
+        cause: String,
+    },
+    /// An address that cannot be.
+    #[error(
+        "viewer address \"{url}\": {cause}; write rerun+http://HOST:PORT/proxy, for example rerun+http://127.0.0.1:{VIEWER_PORT}/proxy"
+    )]
+    Address {
+        /// As given.
+        url: String,
+        /// What is wrong.
+        cause: String,
+    },
+    /// No viewer to start.
+    #[error(
+        "no viewer to start: {tried}; install version {VIEWER_VERSION} with pip install rerun-sdk=={VIEWER_VERSION}, name the executable, or \
+         save a recording instead"
+    )]
+    NoExecutable {
+        /// Where it was looked for.
+        tried: String,
+    },
+    /// A viewer that started but does not listen.
+    #[error("the viewer \"{}\" {cause}; on a machine without a display save a recording or serve the web viewer instead", executable.display())]
+    NotReady {
+        /// What was started.
+        executable: PathBuf,
+        /// What it did.
+        cause: String,
+    },
+    /// A port that is taken.
+    #[error("port {port} on this machine cannot be used: {cause}; choose another port")]
+    Port {
+        /// The port.
+        port: u16,
+        /// What the system says.
+        cause: String,
+    },
+    /// A recording that cannot be made.
+    #[error("recording \"{}\": cannot be created: {cause}; name a file in a folder that exists and may be written", file.display())]
+    Create {
+        /// Path.
+        file: PathBuf,
+        /// What the system says.
+        cause: String,
+    },
+    /// The viewer's library refused.
+    #[error("the viewer stream could not be set up: {cause}")]
+    Setup {
+        /// What it says.
+        cause: String,
+    },
+    /// The stream ended early.
+    #[error("the stream to {target} was lost after {frames} output times: {cause}; {remedy}")]
+    Lost {
+        /// Path or address.
+        target: String,
+        /// Output times handed over.
+        frames: u64,
+        /// What happened.
+        cause: String,
+        /// What to do.
+        remedy: &'static str,
+    },
+}
+
+impl ViewerError {
+    /// Output times that were handed over before the error.
+    #[must_use]
+    pub fn frames(&self) -> u64 {
+        if let Self::Lost { frames, .. } = self { *frames } else { 0 }
+    }
+}
+
+/// What a stream did.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ViewerSummary {
+    /// Output times that reached the file or viewer.
+    pub frames: u64,
+}
+
+/// What the thread does with snapshots.
+pub trait FrameLog: Send + 'static {
+    /// Logs one output time.
+    ///
+    /// # Errors
+    /// What went wrong, in words.
+    fn frame(&mut self, snapshot: &Snapshot) -> Result<(), String>;
+    /// Logs a line at a time (s).
+    ///
+    /// # Errors
+    /// As [`Self::frame`].
+    fn note(&mut self, time: f64, text: &str) -> Result<(), String>;
+    /// Brings everything to file or viewer.
+    ///
+    /// # Errors
+    /// As [`Self::frame`].
+    fn close(self) -> Result<(), String>;
+}
+
+enum Message {
+    Frame(Box<Snapshot>),
+    Note(f64, String),
+}
+
+/// A stream that is fed.
+#[derive(Debug)]
+pub struct ViewerStream {
+    target: String,
+    remedy: &'static str,
+    hinges: Vec<usize>,
+    sender: Option<Sender<Message>>,
+    done: Receiver<(u64, Result<(), String>)>,
+    sent: u64,
+    lost: Option<ViewerError>,
+}
+
+impl ViewerStream {
+    /// Starts the thread. `hinges` are the bodies whose hinge loads `log` shows, `remedy` what to do if the stream is lost.
+    ///
+    /// # Errors
+    /// If the system gives no thread.
+    pub fn start(mut log: impl FrameLog, target: String, remedy: &'static str, hinges: Vec<usize>) -> Result<Self, ViewerError> {
+        let (sender, receiver) = bounded::<Message>(IN_FLIGHT);
+        let (finished, done) = bounded(1);
+        let work = move || {
+            let mut frames = 0;
+            let fed = receiver.iter().try_for_each(|message| match message {
+                Message::Frame(snapshot) => log.frame(&snapshot).map(|()| frames += 1),
+                Message::Note(time, text) => log.note(time, &text),
+            });
+            let result = fed.and_then(|()| log.close());
+            // nobody listens any more if the run gave the stream up
+            let _ = finished.send((frames, result));
+        };
+        let thread = std::thread::Builder::new().name("viewer".into()).spawn(work);
+        thread.map_err(|e| ViewerError::Setup { cause: e.to_string() })?;
+        Ok(Self { target, remedy, hinges, sender: Some(sender), done, sent: 0, lost: None })
+    }
+
+    /// Path or address.
+    #[must_use]
+    pub fn target(&self) -> &str {
+        &self.target
+    }
+
+    /// Bodies whose hinge loads a snapshot holds.
+    #[must_use]
+    pub fn hinges(&self) -> &[usize] {
+        &self.hinges
+    }
+
+    /// Hands over one output time.
+    pub fn send(&mut self, snapshot: Snapshot) {
+        if self.push(Message::Frame(Box::new(snapshot))) {
+            self.sent += 1;
+        }
+    }
+
+    /// Hands over a line.
+    pub fn note(&mut self, time: f64, text: &str) {
+        self.push(Message::Note(time, text.to_owned()));
+    }
+
+    fn push(&mut self, message: Message) -> bool {
+        let Some(sender) = &self.sender else { return false };
+        match sender.send_timeout(message, PATIENCE) {
+            Ok(()) => return true,
+            Err(SendTimeoutError::Timeout(_)) => {
+                let cause = format!("it took no data for {} s", PATIENCE.as_secs());
+                self.lost = Some(self.lost_by(self.sent, cause));
+            }
+            Err(SendTimeoutError::Disconnected(_)) => {
+                let (frames, cause) = match self.done.recv_timeout(PROBE) {
+                    Ok((frames, Err(cause))) => (frames, cause),
+                    _ => (self.sent, "its thread ended".to_owned()),
+                };
+                self.lost = Some(self.lost_by(frames, cause));
+            }
+        }
+        self.sender = None;
+        false
+    }
+
+    fn lost_by(&self, frames: u64, cause: String) -> ViewerError {
+        ViewerError::Lost { target: self.target.clone(), frames, cause, remedy: self.remedy }
+    }
+
+    /// Waits, within bounds, until everything has reached file or viewer.
+    ///
+    /// # Errors
+    /// If something did not.
+    pub fn finish(mut self) -> Result<ViewerSummary, ViewerError> {
+        self.sender = None;
+        if let Some(lost) = self.lost.take() {
+            return Err(lost);
+        }
+        match self.done.recv_timeout(CLOSING) {
+            Ok((frames, Ok(()))) => Ok(ViewerSummary { frames }),
+            Ok((frames, Err(cause))) => Err(self.lost_by(frames, cause)),
+            Err(RecvTimeoutError::Timeout) => {
+                Err(self.lost_by(self.sent, format!("it did not take the rest within {} s", CLOSING.as_secs())))
+            }
+            Err(RecvTimeoutError::Disconnected) => Err(self.lost_by(self.sent, "its thread ended".into())),
+        }
+    }
+}
+
+/// The address in full, after making sure that somebody listens there.
+///
+/// # Errors
+/// If the address cannot be read or nobody listens.
+pub fn probe(url: &str) -> Result<String, ViewerError> {
+    let address = |cause: &str| ViewerError::Address { url: url.to_owned(), cause: cause.to_owned() };
+    let (full, authority) = match url.split_once("://") {
+        Some((_, rest)) => (url.to_owned(), rest.split('/').next().unwrap_or_default().to_owned()),
+        None => {
+            let host = url.trim_end_matches('/');
+            let authority = if host.contains(':') { host.to_owned() } else { format!("{host}:{VIEWER_PORT}") };
+            (format!("rerun+http://{authority}/proxy"), authority)
+        }
+    };
+    let authority = if authority.rsplit_once(':').is_some_and(|(_, port)| port.parse::<u16>().is_ok()) {
+        authority
+    } else if authority.is_empty() || authority.contains(':') {
+        return Err(address("no host and port in it"));
+    } else {
+        format!("{authority}:{VIEWER_PORT}")
+    };
+    let addresses = authority.to_socket_addrs().map_err(|e| address(&e.to_string()))?;
+    let mut cause = "no such host".to_owned();
+    for at in addresses {
+        match TcpStream::connect_timeout(&at, PROBE) {
+            Ok(_) => return Ok(full),
+            Err(e) => cause = e.to_string(),
+        }
+    }
+    Err(ViewerError::NoListener { url: full, cause })
+}
+
+/// Makes sure that a port of this machine is free.
+///
+/// # Errors
+/// If it is not.
+pub fn free_port(port: u16) -> Result<(), ViewerError> {
+    TcpListener::bind(("127.0.0.1", port)).map(drop).map_err(|e| ViewerError::Port { port, cause: e.to_string() })
+}
+
+/// Starts a viewer unless one listens already; returns its address.
+///
+/// # Errors
+/// If there is no viewer to start, or it does not come to listen.
+pub fn spawn(executable: Option<&Path>) -> Result<String, ViewerError> {
+    let at = SocketAddr::from(([127, 0, 0, 1], VIEWER_PORT));
+    let listens = || TcpStream::connect_timeout(&at, PROBE).is_ok();
+    let url = format!("rerun+http://127.0.0.1:{VIEWER_PORT}/proxy");
+    if executable.is_none() && listens() {
+        return Ok(url);
+    }
+    let executable = find_viewer(executable)?;
+    let mut command = Command::new(&executable);
+    command.args(["--port", &VIEWER_PORT.to_string(), "--expect-data-soon", "--hide-welcome-screen"]);
+    // the viewer outlives the run, and its chatter does not mix with results on standard output
+    command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+    #[cfg(unix)]
+    std::os::unix::process::CommandExt::process_group(&mut command, 0);
+    let not_ready = |cause: String| ViewerError::NotReady { executable: executable.clone(), cause };
+    let mut child = command.spawn().map_err(|e| not_ready(format!("cannot be started: {e}")))?;
+    let begin = Instant::now();
+    while begin.elapsed() < START {
+        if listens() {
+            return Ok(url);
+        }
+        if let Ok(Some(status)) = child.try_wait() {
+            return Err(not_ready(format!("ended at once ({status})")));
+        }
+        std::thread::sleep(Duration::from_millis(100));
+    }
+    Err(not_ready(format!("does not listen on port {VIEWER_PORT} after {} s", START.as_secs())))
+}
+
+/// The viewer's executable: the one given, that on PATH, or that of `.venv/bin`.
+fn find_viewer(given: Option<&Path>) -> Result<PathBuf, ViewerError> {
+    if let Some(given) = given {
+        let missing = || ViewerError::NoExecutable { tried: format!("\"{}\" is no file", given.display()) };
+        return if given.is_file() { Ok(given.to_owned()) } else { Err(missing()) };
+    }
+    let name = format!("rerun{}", std::env::consts::EXE_SUFFIX);
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    let folders = std::env::split_paths(&path).chain([PathBuf::from(".venv/bin")]);
+    let found = folders.map(|folder| folder.join(&name)).find(|file| file.is_file());
+    found.ok_or_else(|| ViewerError::NoExecutable { tried: format!("`{name}` is neither on PATH nor in .venv/bin") })
+}
