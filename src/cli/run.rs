@@ -136,7 +136,7 @@ fn default_recording(arguments: &RunArguments) -> PathBuf {
 }
 
 #[cfg(feature = "rerun")]
-fn open_viewer(arguments: &RunArguments, viewer: Viewer, _scene: &Scene, outputs: &mut OutputSet<'_>) -> Result<(), Failure> {
+fn open_viewer(arguments: &RunArguments, viewer: Viewer, scene: &Scene, outputs: &mut OutputSet<'_>) -> Result<(), Failure> {
     use crate::output::ViewerTarget;
     let target = match viewer {
         Viewer::None => return Ok(()),
@@ -145,7 +145,7 @@ fn open_viewer(arguments: &RunArguments, viewer: Viewer, _scene: &Scene, outputs
         Viewer::Connect => ViewerTarget::Connect { url: arguments.url.clone() },
         Viewer::Web => ViewerTarget::Web { port: arguments.port, grpc_port: arguments.port.wrapping_add(1) },
     };
-    outputs.open_viewer(target).map_err(|e| Failure::input(with_causes(&e)))
+    outputs.open_viewer(&target, &scene.state).map_err(|e| Failure::input(with_causes(&e)))
 }
 
 #[cfg(not(feature = "rerun"))]

@@ -20,8 +20,6 @@ pub mod surface;
 pub mod tracker;
 pub mod viewer;
 
-#[cfg(feature = "rerun")]
-pub use self::rerun::{ViewerError, ViewerTarget};
 pub use evaluation::Evaluation;
 pub use plan::{BodyBox, BodySurface, ModalFileRecord, Monitor, OutputPlan, PlanError};
 pub use report::RunReport;
