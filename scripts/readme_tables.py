@@ -1,0 +1,111 @@
+#!/usr/bin/env python3
+"""Writes the measured tables of README.md between their markers: validation and cost. Needs target/release/pliant."""
+import argparse
+import json
+import math
+import pathlib
+import re
+import subprocess
+import sys
+
+ROOT = pathlib.Path(__file__).resolve().parents[1]
+PROGRAM = ROOT / "target" / "release" / "pliant"
+
+
+def pliant(*arguments):
+    """Parsed JSON output of one command."""
+    done = subprocess.run([PROGRAM, *map(str, arguments), "--json"], cwd=ROOT, capture_output=True, text=True)
+    if done.returncode:
+        sys.exit(f"pliant {' '.join(map(str, arguments))}: {done.stderr}")
+    return json.loads(done.stdout)
+
+
+def case_errors(path):
+    """Largest error of each quantity of a worked case, relative to its largest entry; moments of 1 m arms against forces where all vanish."""
+    expected, found = json.loads(path.with_suffix(".json").read_text()), pliant("eval", path)
+    pairs = {"hinge acceleration": [], "moment": [], "force": [], "modal acceleration": []}
+    for name, hinge in expected["hinges"].items():
+        other = found["hinges"][name]
+        pairs["hinge acceleration"] += zip(hinge["acceleration"], other["acceleration"])
+        pairs["moment"] += zip(hinge["load"]["moment"], other["load"]["moment"])
+        pairs["force"] += zip(hinge["load"]["force"], other["load"]["force"])
+    for name, body in expected["bodies"].items():
+        pairs["modal acceleration"] += zip(body["modal_acceleration"], found["bodies"][name]["modal_acceleration"])
+    size = {key: max((abs(e) for e, _ in values), default=0.0) for key, values in pairs.items()}
+    size["moment"] = max(size["moment"], 1e-3 * size["force"])
+    return {key: max(abs(e - f) for e, f in values) / size[key] for key, values in pairs.items() if values}
+
+
+def case_rows():
+    """One row per family of worked cases."""
+    families = {}
+    for path in sorted((ROOT / "tests/data/cases").glob("*.toml")):
+        families.setdefault(path.stem.split("_")[0], []).append(case_errors(path))
+    titles = {"rigid": "rigid trees", "flexible": "cantilever bodies", "freefree": "free-free bodies", "tree": "rigid and flexible bodies, node loads",
+              "prescribed": "prescribed hinges", "loop": "closed chains"}
+    for family, errors in families.items():
+        worst = max(max(e.values()) for e in errors)
+        loads = max(max(e.get("moment", 0), e.get("force", 0)) for e in errors)
+        yield (f"{len(errors)} random scenes: {titles[family]}", "accelerations; hinge loads", "first-principles program", f"{worst:.0e}; {loads:.0e}")
+
+
+def example_rows():
+    """Numbers of the examples that are known from elsewhere."""
+    report = pliant("run", "examples/01_double_pendulum/scene.toml")
+    first, second = (report["final"]["hinges"][h]["position"][0] for h in ("shoulder", "elbow"))
+    error = max(abs(first + math.pi / 2 + 0.482971534251754377), abs(first + second + math.pi / 2 + 1.32404871230236255))
+    yield ("double pendulum, both links at 2 s", "angle (rad)", "29-digit integration", f"{error:.0e}")
+    report = pliant("run", "examples/02_hub_two_panels/scene.toml", "--viewer", "none")
+    expected = -20 * math.sin(math.pi / 3) / 420
+    sunk = report["final"]["hinges"]["attitude"]["position"][2]
+    yield ("hub with two panels, settled", "hub displacement (m)", f"centre of mass stays: {expected:.5f}", f"{abs(sunk / expected - 1):.0e}")
+    yield ("the same", "energy less work; momentum", "conserved", f"{report['errors']['energy']:.0e}; {report['errors']['momentum']:.0e}")
+    yield ("the same", "hinge loads, whole run", "Newton-Euler audit", f"{report['errors']['audit']:.0e}")
+    report = pliant("run", "examples/03_boom_tip_mass/scene.toml")
+    moment = report["final"]["hinges"]["root"]["load"]["moment"][1]
+    yield ("boom under a tip force, settled", "root moment (N m)", "statics: 30", f"{abs(moment / 30 - 1):.0e}")
+    report = pliant("run", "examples/04_three_panels/scene.toml")
+    moment = report["final"]["hinges"]["root"]["load"]["moment"][1]
+    yield ("wing of three panels, slow force", "root moment (N m)", "statics: 0.6", f"{abs(moment / 0.6 - 1):.0e}")
+    peaks = [pliant("run", f"examples/05_free_free/{name}.toml")["peaks"]["hinges"]["base"]["moment"] for name in ("cantilever", "free_free")]
+    yield ("lifted panel, free-free against cantilever modes", "peak root moment", "each other", f"{abs(peaks[1] / peaks[0] - 1):.0e}")
+
+
+def validation_table():
+    """The validation table as Markdown."""
+    rows = [("problem", "quantity", "reference", "relative error"), ("---",) * 4, *case_rows(), *example_rows()]
+    return "\n".join("| " + " | ".join(row) + " |" for row in rows)
+
+
+def cost_table():
+    """Cost per body as the scaling test prints it."""
+    command = ["cargo", "test", "--release", "--locked", "--test", "physics", "cost_of_an_evaluation", "--", "--nocapture"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    found = re.search(r"(\d+) ns per body of 1e3, (\d+) ns per body of 1e4", done.stdout)
+    if not found:
+        sys.exit(f"the scaling test printed no figures: {done.stdout}{done.stderr}")
+    return f"| chain of rigid links | ns per body and evaluation |\n| --- | --- |\n| 1,000 | {found[1]} |\n| 10,000 | {found[2]} |"
+
+
+TABLES = {"validation": validation_table, "cost": cost_table}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("tables", nargs="*", metavar="TABLE", help=f"tables to write, of {', '.join(TABLES)}; all if none")
+    names = parser.parse_args().tables or list(TABLES)
+    if unknown := set(names) - set(TABLES):
+        parser.error(f"unknown table {unknown.pop()}; known: {', '.join(TABLES)}")
+    readme = ROOT / "README.md"
+    text = readme.read_text()
+    for name in names:
+        begin, end = f"<!-- {name}: written by scripts/readme_tables.py -->", f"<!-- end of {name} -->"
+        if begin not in text:
+            sys.exit(f"README.md has no marker {begin}")
+        head, rest = text.split(begin)
+        text = head + begin + "\n" + TABLES[name]() + "\n" + end + rest.split(end, 1)[1]
+    readme.write_text(text)
+
+
+if __name__ == "__main__":
+    main()
