@@ -4,7 +4,8 @@ use nalgebra::{Matrix3, Vector3};
 use pliant::integrate::simulate::Method;
 use pliant::integrate::step_control::Tolerance;
 use pliant::integrate::{Settings, Summary, simulate};
-use pliant::io::ModalFile;
+use pliant::io::results_file::{BLOCK_ROWS, Preface, SeriesSpec};
+use pliant::io::{ModalFile, ResultsFile};
 use pliant::model::build::{BodyDefinition, BodyDefinitionKind, Definition, FlexibleDefinition, Frame, HingeDefinition, WORLD};
 use pliant::model::flexible_body::ModalIntegrals;
 use pliant::model::{InertiaOrder, State, System, TimeFunction};
@@ -273,6 +274,7 @@ fn a_recording_on_disk_is_whole() -> Tested {
     let wall = begin.elapsed();
     let report = report(outputs, &summary);
     let viewer = report.files.iter().find(|f| f.kind == "viewer").ok_or("no viewer")?;
+    assert!(report.files.iter().all(|f| f.problem.is_none()), "{:?}", report.files);
     println!("{} frames in {wall:?}, {:?} with the flush, {} bytes", viewer.frames, begin.elapsed(), std::fs::metadata(&file)?.len());
     assert_eq!((viewer.frames, &viewer.problem), (61, &None));
     Ok(())
@@ -303,6 +305,30 @@ fn what_cannot_be_written_is_said_and_the_run_goes_on() -> Tested {
     let results = report.files.iter().find(|f| f.kind == "results").ok_or("no results")?;
     assert_eq!((results.frames, &results.problem), (31, &None));
     assert_eq!(hdf5::File::open(&file)?.dataset("time")?.shape(), [31]);
+    Ok(())
+}
+
+/// What is on disk while the file is still open is what a killed run leaves.
+#[test]
+fn a_killed_run_leaves_a_readable_file() -> Tested {
+    let folder = tempfile::tempdir()?;
+    let (file, left) = (folder.path().join("run.h5"), folder.path().join("left.h5"));
+    let series = [("time", None), ("a/pair", Some(2))].map(|(path, width)| SeriesSpec { path: path.into(), width, attributes: vec![] });
+    let mut results = ResultsFile::create(&file, &Preface::default(), &series)?;
+    for i in 0..BLOCK_ROWS + 7 {
+        let t = i as f64;
+        results.push([t, 2.0 * t, 3.0 * t])?;
+    }
+    std::fs::copy(&file, &left)?;
+    let read = hdf5::File::open(&left)?;
+    assert_eq!(read.dataset("time")?.shape(), [BLOCK_ROWS]);
+    assert_eq!(read.dataset("a/pair")?.read_2d::<f64>()?[(BLOCK_ROWS - 1, 1)], 3.0 * (BLOCK_ROWS - 1) as f64);
+    assert!(read.attr("completed").is_err());
+    drop(read);
+    assert_eq!(results.finish(false, 70.0)?, BLOCK_ROWS as u64 + 7);
+    let whole = hdf5::File::open(&file)?;
+    assert_eq!(whole.attr("completed")?.read_scalar::<u8>()?, 0);
+    assert_eq!(whole.dataset("a/pair")?.shape(), [BLOCK_ROWS + 7, 2]);
     Ok(())
 }
 

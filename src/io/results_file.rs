@@ -156,7 +156,7 @@ impl ResultsFile {
     }
 
     fn append(&mut self) -> hdf5::Result<()> {
-        let rows = if self.row == 0 { 0 } else { self.buffer.len() / self.row };
+        let rows = self.buffer.len().checked_div(self.row).unwrap_or(0);
         if rows == 0 {
             return Ok(());
         }
@@ -243,6 +243,6 @@ fn write_text(location: &Location, name: &str, text: &str) -> hdf5::Result<()> {
     }
     let text = text[..end].replace('\0', " ");
     let value: FixedUnicode<TEXT_LIMIT> = text.parse().map_err(|_| hdf5::Error::from("a text with a NUL"))?;
-    let attribute = location.new_attr_builder().empty_as(&TypeDescriptor::FixedUnicode(text.len().max(1))).create(name)?;
+    let attribute = location.new_attr_builder().empty_as(TypeDescriptor::FixedUnicode(text.len().max(1))).create(name)?;
     attribute.as_writer().write_scalar(&value)
 }

@@ -106,7 +106,7 @@ impl Picture {
         let (low, high) = extent(system, &bodies, start);
         let (center, radius) = ((low + high) * 0.5, (0.5 * (high - low).norm()).max(1e-3));
         let edge = high - low;
-        let away = if edge.y > edge.x { Vector3::new(1.25, -0.5, 0.7) } else { Vector3::new(0.5, -1.25, 0.7) };
+        let away = if edge.y > edge.x { Vector3::new(1.05, -0.8, 0.7) } else { Vector3::new(0.8, -1.05, 0.7) };
         Self {
             scene: plan.scene_name.clone(),
             hinges: plan.loaded_hinges().into_iter().map(hinge).collect(),

@@ -17,9 +17,10 @@ use rerun::blueprint::{
 };
 use rerun::external::re_log_types::{BlueprintActivationCommand, EntityPath, EntityPathPart, LogMsg};
 use rerun::external::re_sdk_types::blueprint::archetypes::{Background, EyeControls3D, LineGrid3D, PlotLegend, TextLogColumns};
+use rerun::sink::SinkFlushError;
 use rerun::{AsComponents, RecordingStream, RecordingStreamBuilder, RecordingStreamError, RecordingStreamResult};
 use std::path::Path;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Name under which viewers keep the layout.
 const APPLICATION: &str = "pliant";
@@ -27,6 +28,8 @@ const APPLICATION: &str = "pliant";
 pub const TIMELINE: &str = "sim_time";
 /// How long a flush may take (s).
 const FLUSH: Duration = Duration::from_secs(20);
+/// How long a file may stand still while it is flushed (s).
+const STALLED: Duration = Duration::from_secs(3);
 /// Length of the longest arrow relative to the radius of the scene.
 const ARROW: f64 = 0.45;
 /// Colours of moments and forces in the 3D view, and of x, y, z, magnitude and limit in plots.
@@ -302,7 +305,11 @@ impl FrameLog for RerunLog {
 
     fn close(self) -> Result<(), String> {
         let Self { recording, end, .. } = self;
-        if let Err(error) = recording.flush_with_timeout(FLUSH) {
+        let flushed = match &end {
+            End::File(file) => flush_to_disk(&recording, file),
+            End::Viewer | End::Server => recording.flush_with_timeout(FLUSH),
+        };
+        if let Err(error) = flushed {
             // dropping would wait for a viewer that is gone
             std::mem::forget(recording);
             return Err(error.to_string());
@@ -319,6 +326,19 @@ impl FrameLog for RerunLog {
             }
         }
         Ok(())
+    }
+}
+
+/// Flushes for as long as the file grows: on a full disk the SDK's writer is gone, and the flush would only end with its time limit.
+fn flush_to_disk(recording: &RecordingStream, file: &Path) -> Result<(), SinkFlushError> {
+    let length = || std::fs::metadata(file).map_or(0, |m| m.len());
+    let begin = Instant::now();
+    loop {
+        let before = length();
+        let flushed = recording.flush_with_timeout(STALLED);
+        if flushed.is_ok() || length() == before || begin.elapsed() > FLUSH {
+            return flushed;
+        }
     }
 }
 
