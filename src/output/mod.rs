@@ -13,6 +13,7 @@ pub mod report;
 pub mod rerun;
 #[cfg(feature = "hdf5")]
 pub mod results;
+pub mod scales;
 #[cfg(feature = "hdf5")]
 pub mod scene_plan;
 pub mod set;

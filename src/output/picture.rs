@@ -1,5 +1,5 @@
-//! What pictures need besides the data: boxes of rigid bodies, extent of the scene, scales of arrows and colours, and one output time
-//! as a small message. Nothing here knows of a viewer.
+//! What pictures need besides the data: boxes of rigid bodies, the extent and aspect of the scene, and one output time as a small message.
+//! Nothing here knows of a viewer.
 
 use super::frame::OutputFrame;
 use super::plan::{BodyBox, OutputPlan};
@@ -15,6 +15,9 @@ use crate::spatial::shift::{angular, linear};
 use nalgebra::{Matrix3, SymmetricEigen, Vector3, Vector6};
 use std::ops::Range;
 use std::sync::Arc;
+
+/// How far the eye is, in radii of the scene and lengths of its direction: close enough to fill a view of 4 to 3.
+const DISTANCE: f64 = 1.1;
 
 /// A box on a body, in axes of its frame B.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -85,6 +88,8 @@ pub struct Picture {
     pub center: [f64; 3],
     /// Radius (m) around it.
     pub radius: f64,
+    /// Where to look at the centre from: away from the longest horizontal edge, so that it is seen at full length (m, inertial axes).
+    pub eye: [f64; 3],
 }
 
 impl Picture {
@@ -98,14 +103,18 @@ impl Picture {
             let (side, frame) = (super::channels::load_side(system, owner), super::channels::load_frame(owner));
             HingePicture { name: owner.hinge.name.clone(), body, side, frame, moment_limit, force_limit }
         };
-        let (center, radius) = extent(system, &bodies, start);
+        let (low, high) = extent(system, &bodies, start);
+        let (center, radius) = ((low + high) * 0.5, (0.5 * (high - low).norm()).max(1e-3));
+        let edge = high - low;
+        let away = if edge.y > edge.x { Vector3::new(1.05, -0.8, 0.7) } else { Vector3::new(0.8, -1.05, 0.7) };
         Self {
             scene: plan.scene_name.clone(),
             hinges: plan.loaded_hinges().into_iter().map(hinge).collect(),
             bodies,
             deformation_scale: plan.deformation_scale,
-            center,
+            center: center.into(),
             radius,
+            eye: (center + away * (DISTANCE * radius)).into(),
         }
     }
 }
@@ -158,8 +167,8 @@ fn equivalent_box(body: &Body) -> Option<BoxShape> {
     })
 }
 
-/// Centre and radius of all surfaces, boxes and hinges.
-fn extent(system: &System, bodies: &[BodyPicture], start: &State) -> ([f64; 3], f64) {
+/// Lowest and highest corner (m, inertial axes) of all surfaces, boxes and body frames.
+fn extent(system: &System, bodies: &[BodyPicture], start: &State) -> (Vector3<f64>, Vector3<f64>) {
     let mut workspace = Workspace::new(system);
     let mut frames = vec![WorldFrame::default(); system.bodies.len()];
     pose_outward(system, start, &mut workspace.pose);
@@ -182,8 +191,7 @@ fn extent(system: &System, bodies: &[BodyPicture], start: &State) -> ([f64; 3], 
         }
         picture.surface.iter().flat_map(|s| &s.surface.points).for_each(|point| take(Vector3::from(*point)));
     }
-    let (center, radius) = ((low + high) * 0.5, 0.5 * (high - low).norm());
-    if radius.is_finite() { (center.into(), radius.max(1e-3)) } else { ([0.0; 3], 1.0) }
+    if (high - low).norm().is_finite() { (low, high) } else { (Vector3::repeat(-1.0), Vector3::repeat(1.0)) }
 }
 
 /// A load in a picture.
@@ -235,87 +243,5 @@ impl Snapshot {
             modal_position: state.modal_position.clone(),
             events: events.iter().map(|e| (matches!(e, Event::Exceeded(_)), e.text())).collect(),
         }
-    }
-}
-
-/// A scale that is a limit, or the smallest of 1, 2, 5, 10, ... above everything seen so far, so that it changes seldom.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Scale {
-    limit: bool,
-    /// The value that fills the scale; zero before anything was seen.
-    pub full: f64,
-}
-
-impl Scale {
-    /// A scale that ends at `limit`, or grows.
-    #[must_use]
-    pub fn new(limit: Option<f64>) -> Self {
-        Self { limit: limit.is_some(), full: limit.unwrap_or(0.0) }
-    }
-
-    /// True if the scale ends at a limit.
-    #[must_use]
-    pub fn is_limit(&self) -> bool {
-        self.limit
-    }
-
-    /// Takes in a value; true if the scale had to change.
-    pub fn cover(&mut self, value: f64) -> bool {
-        if self.limit || value <= self.full || !value.is_finite() {
-            return false;
-        }
-        let decade = 10.0_f64.powf(value.log10().floor());
-        self.full = [1.0, 2.0, 5.0, 10.0].into_iter().map(|m| m * decade).find(|full| *full >= value).unwrap_or(value);
-        true
-    }
-
-    /// The share of the scale that `value` fills.
-    #[must_use]
-    pub fn share(&self, value: f64) -> f64 {
-        if self.full > 0.0 { value / self.full } else { 0.0 }
-    }
-}
-
-/// Colours from none to full stress.
-#[derive(Debug, Clone)]
-pub struct ColourMap(Vec<[u8; 3]>);
-
-impl Default for ColourMap {
-    fn default() -> Self {
-        Self((0..256_usize).map(|i| colorous::VIRIDIS.eval_rational(i, 256).as_array()).collect())
-    }
-}
-
-impl ColourMap {
-    /// Name for legends.
-    pub const NAME: &'static str = "viridis";
-
-    /// Colour of the share `x` from 0 to 1.
-    #[must_use]
-    pub fn colour(&self, x: f64) -> [u8; 3] {
-        self.0[(x.clamp(0.0, 1.0) * 255.0) as usize]
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn scales_grow_in_steps_and_limits_stay() {
-        let mut scale = Scale::new(None);
-        assert!(scale.cover(0.013) && (scale.full - 0.02).abs() < 1e-15 && !scale.cover(0.019));
-        assert!(scale.cover(430.0) && (scale.full - 500.0).abs() < 1e-9 && (scale.share(250.0) - 0.5).abs() < 1e-12);
-        let mut limit = Scale::new(Some(30.0));
-        assert!(!limit.cover(400.0) && limit.full == 30.0);
-    }
-
-    #[test]
-    fn colours_run_from_dark_to_bright_and_saturate() {
-        let map = ColourMap::default();
-        let light = |x| map.colour(x).iter().map(|&c| u32::from(c)).sum::<u32>();
-        assert!(light(0.0) < light(0.5) && light(0.5) < light(1.0));
-        assert_eq!(map.colour(7.0), map.colour(1.0));
-        assert_eq!(map.colour(f64::NAN), map.colour(0.0));
     }
 }

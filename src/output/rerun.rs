@@ -4,20 +4,23 @@
 //! updates, since static data would hide what is logged later under the same component. The SDK waits for ever if nobody takes its data, so
 //! every flush here has a time limit, and a stream that failed is not dropped but left to the end of the process.
 
-use super::picture::{BodyPicture, ColourMap, HingePicture, LoadSnapshot, Picture, Scale, Snapshot};
+use super::picture::{BodyPicture, HingePicture, LoadSnapshot, Picture, Snapshot};
 use super::plan::OutputPlan;
+use super::scales::{ColourMap, Scales, line_colour};
 use super::viewer::{FrameLog, ViewerError, ViewerStream, ViewerTarget, free_port, probe, spawn};
 use crate::model::{State, System};
-use rerun::blueprint::components::{PanelState, PlayState};
+use rerun::blueprint::components::{BackgroundKind, PanelState, PlayState, TextLogColumn};
+use rerun::blueprint::datatypes::{self, TextLogColumnKind};
 use rerun::blueprint::{
     Blueprint, BlueprintPanel, ContainerLike, Grid, Horizontal, SelectionPanel, Spatial3DView, Tabs, TextDocumentView, TextLogView,
     TimePanel, TimeSeriesView, Vertical,
 };
 use rerun::external::re_log_types::{BlueprintActivationCommand, EntityPath, EntityPathPart, LogMsg};
-use rerun::external::re_sdk_types::blueprint::archetypes::EyeControls3D;
-use rerun::{RecordingStream, RecordingStreamBuilder, RecordingStreamError, RecordingStreamResult};
+use rerun::external::re_sdk_types::blueprint::archetypes::{Background, EyeControls3D, LineGrid3D, PlotLegend, TextLogColumns};
+use rerun::sink::SinkFlushError;
+use rerun::{AsComponents, RecordingStream, RecordingStreamBuilder, RecordingStreamError, RecordingStreamResult};
 use std::path::Path;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Name under which viewers keep the layout.
 const APPLICATION: &str = "pliant";
@@ -25,12 +28,16 @@ const APPLICATION: &str = "pliant";
 pub const TIMELINE: &str = "sim_time";
 /// How long a flush may take (s).
 const FLUSH: Duration = Duration::from_secs(20);
+/// How long a file may stand still while it is flushed (s).
+const STALLED: Duration = Duration::from_secs(3);
 /// Length of the longest arrow relative to the radius of the scene.
 const ARROW: f64 = 0.45;
 /// Colours of moments and forces in the 3D view, and of x, y, z, magnitude and limit in plots.
 const MOMENT: [u8; 3] = [255, 140, 0];
 const FORCE: [u8; 3] = [0, 200, 255];
 const SERIES: [[u8; 3]; 5] = [[230, 80, 60], [80, 190, 90], [80, 130, 240], [230, 230, 230], [255, 200, 0]];
+/// Background of the 3D view: dark and bright ends of the colour map stand out from it.
+const SKY: [u8; 3] = [170, 176, 184];
 /// Pa to MPa.
 const MEGA: f64 = 1e-6;
 
@@ -134,26 +141,18 @@ struct RerunLog {
     colours: ColourMap,
     points: Vec<Vec<[f32; 3]>>,
     values: Vec<Vec<f32>>,
-    stress: Scale,
-    moment: Scale,
-    force: Scale,
+    scales: Scales,
     begun: bool,
 }
 
 impl RerunLog {
     fn new(recording: RecordingStream, picture: Picture, end: End) -> RecordingStreamResult<Self> {
-        let largest = |limits: &mut dyn Iterator<Item = f64>| limits.reduce(f64::max);
-        let stress = largest(&mut picture.bodies.iter().filter_map(|b| b.surface.as_ref()?.stress_limit));
-        let moment = largest(&mut picture.hinges.iter().filter_map(|h| h.moment_limit));
-        let force = largest(&mut picture.hinges.iter().filter_map(|h| h.force_limit));
         let room = |body: &BodyPicture| body.surface.as_ref().map_or(0, |s| s.surface.points.len());
         let log = Self {
             points: picture.bodies.iter().map(|b| vec![[0.0; 3]; room(b)]).collect(),
             values: picture.bodies.iter().map(|b| vec![0.0; room(b)]).collect(),
             colours: ColourMap::default(),
-            stress: Scale::new(stress),
-            moment: Scale::new(moment),
-            force: Scale::new(force),
+            scales: Scales::new(&picture),
             begun: false,
             recording,
             picture,
@@ -174,8 +173,8 @@ impl RerunLog {
                 let [w, x, y, z] = shape.quaternion.map(|q| q as f32);
                 let boxes = rerun::Boxes3D::from_centers_and_half_sizes([shape.center], [shape.half_size])
                     .with_quaternions([rerun::Quaternion::from_xyzw([x, y, z, w])])
-                    .with_fill_mode(rerun::FillMode::Solid)
-                    .with_colors([[150_u8, 155, 165]]);
+                    .with_fill_mode(rerun::FillMode::TransparentFillMajorWireframe)
+                    .with_colors([[60_u8, 66, 78]]);
                 rec.log_static(below(&entity, "box"), &boxes)?;
             }
             if let Some(surface) = &body.surface {
@@ -190,8 +189,9 @@ impl RerunLog {
                 }
             }
             if !body.mode_names.is_empty() {
-                let names = rerun::SeriesLines::new().with_names(body.mode_names.iter().map(String::as_str));
-                rec.log_static(path(&["modes", &body.name]), &names)?;
+                let series = rerun::SeriesLines::new().with_names(body.mode_names.iter().map(String::as_str));
+                let series = series.with_colors((0..body.mode_names.len()).map(line_colour));
+                rec.log_static(path(&["modes", &body.name]), &series)?;
             }
         }
         for hinge in &self.picture.hinges {
@@ -215,12 +215,12 @@ impl RerunLog {
             surface.surface.deform(eta, self.picture.deformation_scale, &mut self.points[k]);
             if surface.stress {
                 peaks[k] = surface.surface.point_stress(eta, &mut self.values[k]).value;
-                rescaled |= self.stress.cover(peaks[k]);
+                rescaled |= self.scales.stress.cover(peaks[k]);
             }
         }
         for load in &snapshot.loads {
-            rescaled |= self.moment.cover(load.load.fixed_rows::<3>(0).norm());
-            rescaled |= self.force.cover(load.load.fixed_rows::<3>(3).norm());
+            rescaled |= self.scales.moment.cover(load.load.fixed_rows::<3>(0).norm());
+            rescaled |= self.scales.force.cover(load.load.fixed_rows::<3>(3).norm());
         }
         if rescaled {
             self.log_legend()?;
@@ -243,9 +243,8 @@ impl RerunLog {
             if let Some(surface) = &body.surface {
                 let mesh = rerun::Mesh3D::update_fields().with_vertex_positions(self.points[k].iter().copied());
                 let mesh = if surface.stress {
-                    let full = self.stress.full;
-                    let share = |value: &f32| if full > 0.0 { f64::from(*value) / full } else { 0.0 };
-                    mesh.with_vertex_colors(self.values[k].iter().map(|value| self.colours.colour(share(value))))
+                    let colour = |value: &f32| self.colours.colour(self.scales.stress.share(f64::from(*value)));
+                    mesh.with_vertex_colors(self.values[k].iter().map(colour))
                 } else {
                     mesh
                 };
@@ -266,8 +265,8 @@ impl RerunLog {
     fn log_load(&self, hinge: &HingePicture, load: &LoadSnapshot) -> RecordingStreamResult<()> {
         let length = ARROW * self.picture.radius;
         let parts = [
-            ("moment", load.moment_world, 0, self.moment, MOMENT, hinge.moment_limit),
-            ("force", load.force_world, 3, self.force, FORCE, hinge.force_limit),
+            ("moment", load.moment_world, 0, self.scales.moment, MOMENT, hinge.moment_limit),
+            ("force", load.force_world, 3, self.scales.force, FORCE, hinge.force_limit),
         ];
         for (quantity, vector, row, scale, colour, limit) in parts {
             let arrow = vector.map(|x| (length * scale.share(x)) as f32);
@@ -285,18 +284,8 @@ impl RerunLog {
 
     /// The ranges in use, as a document that a view shows and as a log line.
     fn log_legend(&self) -> RecordingStreamResult<()> {
-        let basis = |scale: &Scale| if scale.is_limit() { "the limit" } else { "above the largest so far" };
-        let stress =
-            format!("von Mises stress, {}: dark 0 to bright {} MPa ({})", ColourMap::NAME, self.stress.full * MEGA, basis(&self.stress));
-        let moment = format!("moment arrows (orange): full length {} N m ({})", self.moment.full, basis(&self.moment));
-        let force = format!("force arrows (blue): full length {} N ({})", self.force.full, basis(&self.force));
-        let Picture { scene, deformation_scale, .. } = &self.picture;
-        let text = format!(
-            "## {scene}\n- {stress}\n- {moment}\n- {force}\n- deformation drawn times {deformation_scale}\n- loads: by parent on child, moment about O; \
-             plots in O axes of the hinge\n"
-        );
-        self.recording.log("legend", &rerun::TextDocument::from_markdown(text))?;
-        self.log_line(&format!("scales: {stress}; {moment}; {force}"), rerun::TextLogLevel::INFO)
+        self.recording.log("legend", &rerun::TextDocument::from_markdown(self.scales.legend(&self.picture)))?;
+        self.log_line(&self.scales.line(), rerun::TextLogLevel::INFO)
     }
 
     fn log_line(&self, text: &str, level: &str) -> RecordingStreamResult<()> {
@@ -316,7 +305,11 @@ impl FrameLog for RerunLog {
 
     fn close(self) -> Result<(), String> {
         let Self { recording, end, .. } = self;
-        if let Err(error) = recording.flush_with_timeout(FLUSH) {
+        let flushed = match &end {
+            End::File(file) => flush_to_disk(&recording, file),
+            End::Viewer | End::Server => recording.flush_with_timeout(FLUSH),
+        };
+        if let Err(error) = flushed {
             // dropping would wait for a viewer that is gone
             std::mem::forget(recording);
             return Err(error.to_string());
@@ -336,6 +329,19 @@ impl FrameLog for RerunLog {
     }
 }
 
+/// Flushes for as long as the file grows: on a full disk the SDK's writer is gone, and the flush would only end with its time limit.
+fn flush_to_disk(recording: &RecordingStream, file: &Path) -> Result<(), SinkFlushError> {
+    let length = || std::fs::metadata(file).map_or(0, |m| m.len());
+    let begin = Instant::now();
+    loop {
+        let before = length();
+        let flushed = recording.flush_with_timeout(STALLED);
+        if flushed.is_ok() || length() == before || begin.elapsed() > FLUSH {
+            return flushed;
+        }
+    }
+}
+
 /// True if the last bytes of a recording are its footer, which is written when it is closed.
 fn ends_in_footer(file: &Path) -> bool {
     use std::io::{Read, Seek, SeekFrom};
@@ -351,60 +357,80 @@ fn ends_in_footer(file: &Path) -> bool {
 /// Most hinges whose plots are all open at once; with more, each has a tab.
 const OPEN_HINGES: usize = 3;
 
+/// Properties of views by entity in the blueprint's store: the blueprint builder has none for these kinds of view.
+type Properties = Vec<(EntityPath, Box<dyn AsComponents>)>;
+
 /// The layout: the whole system on the left above legend and events, plots of every load, stress and mode on the right.
-///
-/// The blueprint builder has no camera, but a camera is plain data at `<view>/EyeControls3D` in the blueprint's store.
-fn send_blueprint(recording: &RecordingStream, picture: &Picture) -> RecordingStreamResult<()> {
-    let view: ContainerLike = Spatial3DView::new(picture.scene.as_str()).with_origin("/world").into();
-    let camera = if let ContainerLike::View(view) = &view { view.blueprint_path() } else { EntityPath::root() };
-    let plot = |name: String, origin: EntityPath| -> ContainerLike { TimeSeriesView::new(name).with_origin(origin).into() };
-    let plots_of = |hinge: &HingePicture| {
-        let of = |quantity: &str, unit| {
-            plot(format!("{}: {quantity} {}, {unit}", hinge.name, hinge.side), path(&["loads", &hinge.name, quantity]))
+fn layout(picture: &Picture, properties: &mut Properties) -> Blueprint {
+    let mut set = |view: &ContainerLike, name: &str, property: Box<dyn AsComponents>| {
+        if let ContainerLike::View(view) = view {
+            properties.push((below(&view.blueprint_path(), name), property));
+        }
+    };
+    let space: ContainerLike = Spatial3DView::new(picture.scene.as_str()).with_origin("/world").into();
+    let eye =
+        EyeControls3D::new().with_position(single(picture.eye)).with_look_target(single(picture.center)).with_eye_up([0.0_f32, 0.0, 1.0]);
+    set(&space, "EyeControls3D", Box::new(eye));
+    set(&space, "LineGrid3D", Box::new(LineGrid3D::new().with_visible(false)));
+    set(&space, "Background", Box::new(Background::new(BackgroundKind::SolidColor).with_color(SKY)));
+    let events: ContainerLike = TextLogView::new("events").with_origin("/events").into();
+    let columns = [(TextLogColumnKind::LogLevel, true), (TextLogColumnKind::Body, true)];
+    let columns = columns.map(|(kind, visible)| TextLogColumn(datatypes::TextLogColumn { kind, visible: visible.into() }));
+    set(&events, "TextLogColumns", Box::new(TextLogColumns::new().with_text_log_columns(columns)));
+    let legend: ContainerLike = TextDocumentView::new("legend").with_origin("/legend").into();
+
+    let mut plot = |name: String, origin: EntityPath, named: bool| -> ContainerLike {
+        let view: ContainerLike = TimeSeriesView::new(name).with_origin(origin).into();
+        // the legend of a small plot hides it; names show under the pointer, colours are in the legend
+        set(&view, "PlotLegend", Box::new(PlotLegend::new().with_visible(named)));
+        view
+    };
+    let mut plots_of = |hinge: &HingePicture| {
+        let mut of = |quantity: &str, unit| {
+            plot(format!("{}: {quantity} {}, {unit}", hinge.name, hinge.side), path(&["loads", &hinge.name, quantity]), false)
         };
         [of("moment", "N m"), of("force", "N")]
     };
-    let loads: Option<ContainerLike> = match picture.hinges.len() {
+    let loads: Vec<_> = picture.hinges.iter().map(|h| (h, plots_of(h))).collect();
+    let count = loads.len();
+    let loads: Option<ContainerLike> = match count {
         0 => None,
-        1..=OPEN_HINGES => Some(Grid::new(picture.hinges.iter().flat_map(plots_of)).with_grid_columns(2).into()),
-        _ => Some(Tabs::new(picture.hinges.iter().map(|h| Vertical::new(plots_of(h)).with_name(h.name.as_str()).into())).into()),
+        1..=OPEN_HINGES => Some(Grid::new(loads.into_iter().flat_map(|(_, plots)| plots)).with_grid_columns(2).into()),
+        _ => Some(Tabs::new(loads.into_iter().map(|(h, plots)| Vertical::new(plots).with_name(h.name.as_str()).into())).into()),
     };
     let stressed = picture.bodies.iter().any(|b| b.surface.as_ref().is_some_and(|s| s.stress));
-    let stress = stressed.then(|| plot("von Mises peak, MPa".into(), path(&["stress"])));
-    let modes: Vec<_> = picture.bodies.iter().filter(|b| !b.mode_names.is_empty()).collect();
-    let modes = modes.iter().map(|b| plot(format!("{}: modal coordinates", b.name), path(&["modes", &b.name]))).collect::<Vec<_>>();
-    let modes: Option<ContainerLike> = if modes.is_empty() { None } else { Some(Tabs::new(modes).into()) };
+    let stress = stressed.then(|| plot("von Mises peak, MPa".into(), path(&["stress"]), true));
+    let modes = picture.bodies.iter().filter(|b| !b.mode_names.is_empty());
+    let modes: Vec<_> = modes.map(|b| plot(format!("{}: modal coordinates", b.name), path(&["modes", &b.name]), false)).collect();
+    let modes = (!modes.is_empty()).then(|| Tabs::new(modes).into());
     let lower: Vec<ContainerLike> = stress.into_iter().chain(modes).collect();
-    let lower: Option<ContainerLike> = if lower.is_empty() { None } else { Some(Horizontal::new(lower).into()) };
-    let shares = if loads.is_some() { vec![picture.hinges.len().min(OPEN_HINGES) as f32, 1.0] } else { vec![1.0] };
-    let right = Vertical::new(loads.into_iter().chain(lower)).with_row_shares(shares);
-    let texts = Horizontal::new([
-        TextDocumentView::new("legend").with_origin("/legend").into(),
-        TextLogView::new("events").with_origin("/events").into(),
-    ]);
-    let left = Vertical::new([view, texts.into()]).with_row_shares(vec![3.0, 1.0]);
+    let lower = (!lower.is_empty()).then(|| Horizontal::new(lower).into());
+    let shares: Vec<f32> = loads.iter().map(|_| count.min(OPEN_HINGES) as f32).chain(lower.iter().map(|_| 1.0)).collect();
+    let right: Vec<ContainerLike> = loads.into_iter().chain(lower).collect();
+    let left = Vertical::new([space, Horizontal::new([legend, events]).into()]).with_row_shares(vec![2.6, 1.0]);
+    let columns: Vec<ContainerLike> =
+        if right.is_empty() { vec![left.into()] } else { vec![left.into(), Vertical::new(right).with_row_shares(shares).into()] };
     let time = TimePanel::new().with_timeline(TIMELINE).with_state(PanelState::Collapsed).with_play_state(PlayState::Following);
-    let blueprint = Blueprint::new(Horizontal::new([left.into(), right.into()]).with_column_shares(vec![1.0, 1.0]))
+    Blueprint::new(Horizontal::new(columns))
         .with_time_panel(time)
         .with_blueprint_panel(BlueprintPanel::from_state(PanelState::Hidden))
         .with_selection_panel(SelectionPanel::from_state(PanelState::Hidden))
         .with_auto_views(false)
-        .with_auto_layout(false);
+        .with_auto_layout(false)
+}
 
+/// Sends the layout with the properties of its views, which are plain data in the blueprint's store.
+fn send_blueprint(recording: &RecordingStream, picture: &Picture) -> RecordingStreamResult<()> {
+    let mut properties = Properties::new();
+    let blueprint = layout(picture, &mut properties);
     let (scratch, store) = RecordingStreamBuilder::new(APPLICATION).memory()?;
     blueprint.send(&scratch, Default::default())?;
-    let messages = store.take().into_iter();
-    let mut messages: Vec<LogMsg> = messages
-        .filter(|m| m.store_id().kind() == rerun::StoreKind::Blueprint && !matches!(m, LogMsg::BlueprintActivationCommand(_)))
-        .collect();
+    let wanted = |m: &LogMsg| m.store_id().kind() == rerun::StoreKind::Blueprint && !matches!(m, LogMsg::BlueprintActivationCommand(_));
+    let mut messages: Vec<LogMsg> = store.take().into_iter().filter(wanted).collect();
     let Some(id) = messages.first().map(|m| m.store_id().clone()) else { return Ok(()) };
     let (extra, store) = RecordingStreamBuilder::from_store_id(&id).memory()?;
     extra.set_time_sequence("blueprint", 0);
-    let away = [0.55, -1.25, 0.8].map(|x| 1.05 * x * picture.radius);
-    let eye = std::array::from_fn::<f64, 3, _>(|i| picture.center[i] + away[i]);
-    let controls =
-        EyeControls3D::new().with_position(single(eye)).with_look_target(single(picture.center)).with_eye_up([0.0_f32, 0.0, 1.0]);
-    extra.log(below(&camera, "EyeControls3D"), &controls)?;
+    properties.iter().try_for_each(|(entity, property)| extra.log(entity.clone(), property.as_ref()))?;
     messages.extend(store.take().into_iter().filter(|m| matches!(m, LogMsg::ArrowMsg(..))));
     recording.send_blueprint(messages, BlueprintActivationCommand { blueprint_id: id, make_active: true, make_default: true });
     Ok(())

@@ -4,6 +4,7 @@ use super::evaluation::Named;
 use super::frame::OutputFrame;
 use super::plan::OutputPlan;
 use super::report::{BodyPeak, ErrorFigures, Exceedance, HingePeak, Peaks};
+use super::scales::plain;
 use crate::dynamics::energy::Momentum;
 use crate::integrate::Sample;
 use crate::model::{HingeKind, System};
@@ -23,11 +24,12 @@ impl Event {
     #[must_use]
     pub fn text(&self) -> String {
         let (Self::Exceeded(e) | Self::Recovered(e)) = self;
-        let Exceedance { kind, name, quantity, unit, limit, peak, .. } = e;
+        let Exceedance { name, quantity, unit, .. } = e;
         let quantity = quantity.replace('_', " ");
+        let (peak, limit) = (plain(e.peak), plain(e.limit));
         match self {
-            Self::Exceeded(_) => format!("{kind} \"{name}\": {quantity} {peak:.4e} {unit} exceeds its limit {limit:.4e} {unit}"),
-            Self::Recovered(_) => format!("{kind} \"{name}\": {quantity} back within {limit:.4e} {unit} after a peak of {peak:.4e} {unit}"),
+            Self::Exceeded(_) => format!("{name}: {quantity} {peak} {unit} above its limit of {limit} {unit}"),
+            Self::Recovered(_) => format!("{name}: {quantity} within its limit of {limit} {unit} again, peak {peak} {unit}"),
         }
     }
 }

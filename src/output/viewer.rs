@@ -115,7 +115,7 @@ pub enum ViewerError {
         cause: String,
     },
     /// The stream ended early.
-    #[error("the stream to {target} was lost after {frames} output times: {cause}; {remedy}")]
+    #[error("the stream to {target} was lost with {frames} output times handed over: {cause}; {remedy}")]
     Lost {
         /// Path or address.
         target: String,
