@@ -18,11 +18,20 @@ target/release/pliant run examples/02_hub_two_panels/scene.toml --duration 2.55 
 sleep 3
 .venv/bin/python - "$picture" $port <<'PY'
 import sys
+import time
 from PIL import Image
 from rerun.experimental import ViewerClient
 path, port = sys.argv[1], sys.argv[2]
 ViewerClient.connect(f"rerun+http://127.0.0.1:{port}/proxy").save_screenshot(path)
-image = Image.open(path).convert("RGB")
-image.resize((1600, 1600 * image.height // image.width), Image.LANCZOS).quantize(256).save(path, optimize=True)
+for _ in range(50):  # the viewer writes the file after the call returns
+    time.sleep(0.2)
+    try:
+        image = Image.open(path).convert("RGB")
+        break
+    except OSError:
+        continue
+else:
+    sys.exit("screenshot: the viewer wrote no whole picture")
+image.quantize(256).save(path, optimize=True)
 PY
 echo "wrote $picture"

@@ -9,7 +9,7 @@ use crate::dynamics::Workspace;
 use crate::dynamics::sweep::pose_outward::pose_outward;
 use crate::dynamics::world::{WorldFrame, hinge_frame, world_frames};
 use crate::integrate::Sample;
-use crate::model::{Body, BodyKind, State, System};
+use crate::model::{Body, BodyKind, HingeKind, State, System};
 use crate::spatial::rotation::quaternion_of_matrix;
 use crate::spatial::shift::{angular, linear};
 use nalgebra::{Matrix3, SymmetricEigen, Vector3, Vector6};
@@ -71,6 +71,8 @@ pub struct HingePicture {
     pub moment_limit: Option<f64>,
     /// N.
     pub force_limit: Option<f64>,
+    /// False for a free hinge on which nothing acts: its load is zero by definition and needs no plot.
+    pub carries: bool,
 }
 
 /// All that stays the same over a run.
@@ -101,7 +103,9 @@ impl Picture {
             let (moment_limit, force_limit) = plan.hinge_limits(body);
             let owner = &system.bodies[body];
             let (side, frame) = (super::channels::load_side(system, owner), super::channels::load_frame(owner));
-            HingePicture { name: owner.hinge.name.clone(), body, side, frame, moment_limit, force_limit }
+            let hinge = &owner.hinge;
+            let carries = hinge.kind != HingeKind::Free || hinge.torque.is_some() || !hinge.stiffness.is_empty() || !hinge.damping.is_empty();
+            HingePicture { name: hinge.name.clone(), body, side, frame, moment_limit, force_limit, carries }
         };
         let (low, high) = extent(system, &bodies, start);
         let (center, radius) = ((low + high) * 0.5, (0.5 * (high - low).norm()).max(1e-3));

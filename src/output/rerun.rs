@@ -391,7 +391,7 @@ fn layout(picture: &Picture, properties: &mut Properties) -> Blueprint {
         };
         [of("moment", "N m"), of("force", "N")]
     };
-    let loads: Vec<_> = picture.hinges.iter().map(|h| (h, plots_of(h))).collect();
+    let loads: Vec<_> = picture.hinges.iter().filter(|h| h.carries).map(|h| (h, plots_of(h))).collect();
     let count = loads.len();
     let loads: Option<ContainerLike> = match count {
         0 => None,
