@@ -253,3 +253,71 @@ fn every_example_passes_its_check() {
     let done = pliant(&[&["check"], names.as_slice()].concat());
     assert_eq!(done.status.code(), Some(0), "{}", text(&done.stderr));
 }
+
+#[test]
+fn a_table_in_a_csv_file_prescribes_a_hinge_like_the_same_rows_in_the_scene() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("slew.csv"), "# a comment\ntime, angle\n0.0, 0.0\n0.5, 0.3\n1.0, 0.4\n2.0, 0.1\n").unwrap();
+    let original = scene(folder.path());
+    let evaluate = |motion: &str| {
+        let path = folder.path().join("scene.toml");
+        std::fs::write(&path, original.replace("position = [0.2]", &format!("motion = {motion}"))).unwrap();
+        let done = pliant(&["eval", path.to_str().unwrap(), "--time", "0.7", "--json"]);
+        assert_eq!(done.status.code(), Some(0), "{}", text(&done.stderr));
+        text(&done.stdout)
+    };
+    let rows = "{ table = [[0.0, 0.0], [0.5, 0.3], [1.0, 0.4], [2.0, 0.1]] }";
+    assert_eq!(evaluate("{ table = \"slew.csv\" }"), evaluate(rows));
+    // the hinge stands on the spline between its rows
+    let value: Value = serde_json::from_str(&evaluate(rows)).unwrap();
+    let angle = value["hinges"]["pin"]["position"][0].as_f64().unwrap();
+    assert!(angle > 0.3 && angle < 0.45, "{angle}");
+    let sum = evaluate(&format!("{{ sum = [{rows}, {{ constant = 0.5 }}] }}"));
+    let value: Value = serde_json::from_str(&sum).unwrap();
+    assert!((value["hinges"]["pin"]["position"][0].as_f64().unwrap() - angle - 0.5).abs() < 1e-15);
+
+    std::fs::write(folder.path().join("slew.csv"), "0.0, 0.0\n0.5, x\n").unwrap();
+    let path = folder.path().join("scene.toml");
+    std::fs::write(&path, original.replace("position = [0.2]", "motion = { table = \"slew.csv\" }")).unwrap();
+    let done = pliant(&["check", path.to_str().unwrap()]);
+    assert_eq!(done.status.code(), Some(2));
+    assert!(text(&done.stderr).contains("slew.csv: row 2 is \"0.5,x\""), "{}", text(&done.stderr));
+}
+
+#[test]
+fn a_force_on_a_mesh_node_is_that_on_the_interface_which_the_node_is() {
+    // the random body's interface "tip" is a single node
+    let folder = tempfile::tempdir().unwrap();
+    let modal = root().join("tests/data/cantilever.h5");
+    std::fs::copy(&modal, folder.path().join("body.h5")).unwrap();
+    let file = hdf5::File::open(&modal).unwrap();
+    let node = file.dataset("interfaces/tip/nodes").unwrap().read_raw::<i64>().unwrap();
+    assert_eq!(node.len(), 1);
+    let evaluate = |place: &str| {
+        let text_of = format!(
+            "[[body]]\nname = \"b\"\nmodal_file = \"body.h5\"\n[[hinge]]\nname = \"h\"\nkind = \"free\"\nparent = \"world\"\nchild = \"b\"\n\
+             [[load]]\nbody = \"b\"\n{place}\nforce = {{ constant = [1.0, -2.0, 0.5] }}\n"
+        );
+        let path = folder.path().join("scene.toml");
+        std::fs::write(&path, text_of).unwrap();
+        let done = pliant(&["eval", path.to_str().unwrap(), "--json"]);
+        assert_eq!(done.status.code(), Some(0), "{}", text(&done.stderr));
+        serde_json::from_slice::<Value>(&done.stdout).unwrap()["bodies"]["b"]["modal_acceleration"].clone()
+    };
+    let (on_node, on_interface) = (evaluate(&format!("mesh_node = {}", node[0])), evaluate("node = \"tip\""));
+    for (a, b) in on_node.as_array().unwrap().iter().zip(on_interface.as_array().unwrap()) {
+        let (a, b) = (a.as_f64().unwrap(), b.as_f64().unwrap());
+        // the 6-vector agrees with the node within the rule of the schema, 1e-6
+        assert!((a - b).abs() <= 1e-6 * b.abs().max(1.0), "{a} {b}");
+    }
+}
+
+#[test]
+fn a_viewer_that_does_not_listen_is_said_at_once() {
+    let example = root().join("examples/01_double_pendulum/scene.toml");
+    let started = std::time::Instant::now();
+    let done = pliant(&["run", example.to_str().unwrap(), "--viewer", "connect", "--url", "rerun+http://127.0.0.1:9/proxy"]);
+    assert_eq!(done.status.code(), Some(2));
+    assert!(text(&done.stderr).contains("127.0.0.1:9") || cfg!(not(feature = "rerun")), "{}", text(&done.stderr));
+    assert!(started.elapsed().as_secs() < 20);
+}

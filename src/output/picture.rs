@@ -104,7 +104,8 @@ impl Picture {
             let owner = &system.bodies[body];
             let (side, frame) = (super::channels::load_side(system, owner), super::channels::load_frame(owner));
             let hinge = &owner.hinge;
-            let carries = hinge.kind != HingeKind::Free || hinge.torque.is_some() || !hinge.stiffness.is_empty() || !hinge.damping.is_empty();
+            let carries =
+                hinge.kind != HingeKind::Free || hinge.torque.is_some() || !hinge.stiffness.is_empty() || !hinge.damping.is_empty();
             HingePicture { name: hinge.name.clone(), body, side, frame, moment_limit, force_limit, carries }
         };
         let (low, high) = extent(system, &bodies, start);

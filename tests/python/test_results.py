@@ -1,0 +1,58 @@
+"""A results file is read by h5py in three lines and plotted by the script; its loads are those of the closing report."""
+import json
+import pathlib
+import subprocess
+import sys
+
+import h5py
+import numpy as np
+import pytest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+PROGRAM = ROOT / "target" / "release" / "pliant"
+SCENE = ROOT / "examples" / "02_hub_two_panels" / "scene.toml"
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    if not PROGRAM.exists():
+        pytest.skip("target/release/pliant is not built")
+    path = tmp_path_factory.mktemp("results") / "run.h5"
+    done = subprocess.run([PROGRAM, "run", SCENE, "--out", path, "--json"], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return path, json.loads(done.stdout)
+
+
+def test_a_results_file_holds_histories_with_unit_frame_point_and_side(run):
+    with h5py.File(run[0]) as file:
+        time, moment = file["time"][:], file["hinges/drive_left/load_moment"][:]
+        attributes = {key: value.decode() if isinstance(value, bytes) else value for key, value in file["hinges/drive_left/load_moment"].attrs.items()}
+    assert moment.shape == (len(time), 3) and time[0] == 0 and time[-1] == 30
+    assert attributes["unit"] == "N m" and attributes["point"] == "O" and "hub on panel_left" in attributes["side"]
+    assert "drive_left" in attributes["frame"]
+
+
+def test_peaks_of_the_report_are_those_of_the_histories(run):
+    path, report = run
+    with h5py.File(path) as file:
+        for hinge in ("drive_left", "drive_right"):
+            peak = np.linalg.norm(file[f"hinges/{hinge}/load_moment"][:], axis=1).max()
+            # the report takes its peaks at the same output times: equal to rounding of a norm
+            assert abs(peak / report["peaks"]["hinges"][hinge]["moment"] - 1) < 4 * np.finfo(float).eps
+
+
+def test_a_results_file_holds_its_scene_and_the_digests_of_its_modal_files(run):
+    with h5py.File(run[0]) as file:
+        assert bytes(file["scene/toml"][:]).decode() == SCENE.read_text()
+        stored = file["scene/modal_files/panel_left"].attrs["content_sha256"]
+    with h5py.File(ROOT / "modes" / "panel_cantilever.h5") as modal:
+        expected = modal.attrs["content_sha256"]
+    text = lambda x: x.decode() if isinstance(x, bytes) else str(x)  # noqa: E731
+    assert text(stored) == text(expected)
+
+
+def test_the_plot_script_draws_a_results_file(run, tmp_path):
+    picture = tmp_path / "plot.png"
+    done = subprocess.run([sys.executable, ROOT / "scripts" / "plot_results.py", run[0], "--out", picture], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert picture.read_bytes().startswith(b"\x89PNG") and picture.stat().st_size > 20_000
