@@ -4,8 +4,9 @@
 use nalgebra::{Matrix3, Vector3};
 use pliant::io::modal_check::angular_momentum;
 use pliant::io::modal_file::GEOMETRIC_LOADS;
-use pliant::io::{Bound, Coupling, ModalFile, ModeKind, StressLocation, Verdict, examine};
+use pliant::io::{Bound, Coupling, ModalFile, ModeKind, Verdict, examine};
 use pliant::model::modal_body::Boundary;
+use pliant::model::surface::StressPlace;
 use std::path::{Path, PathBuf};
 
 /// Mode shapes of `complete.h5` are stored in single precision.
@@ -111,7 +112,7 @@ fn a_surface_carries_the_stress_of_the_cell_behind_each_triangle() {
     assert_eq!((surface.points.len(), surface.displacement.len(), surface.displacement[0].len()), (150, 2, 150));
     assert_eq!(surface.displacement[1][9].map(f64::from), <[f64; 3]>::from(file.node_displacement(9).unwrap()[0]));
     let stress = surface.stress.unwrap();
-    assert_eq!((stress.location, stress.values.len(), stress.values[0].len()), (StressLocation::Triangle, 2, surface.triangles.len()));
+    assert_eq!((stress.place, stress.values.len(), stress.values[0].len()), (StressPlace::Triangle, 2, surface.triangles.len()));
     // the stress of cell c in mode j is c (1 2 3 4 5 6) + 1000 j, so that xx of mode 0 names the cell
     let cells = hdf5::File::open(data("complete.h5")).unwrap().dataset("mesh/cells").unwrap().read_raw::<i64>().unwrap();
     for (triangle, (last, first)) in surface.triangles.iter().zip(stress.values[0].iter().zip(&stress.values[1])) {

@@ -10,9 +10,7 @@ use pliant::model::build::{BodyDefinition, BodyDefinitionKind, Definition, Flexi
 use pliant::model::flexible_body::ModalIntegrals;
 use pliant::model::{InertiaOrder, State, System, TimeFunction};
 use pliant::output::viewer::probe;
-use pliant::output::{
-    BodyBox, BodySurface, ModalFileRecord, Monitor, OutputPlan, OutputSet, RunReport, Surface, ViewerError, ViewerTarget,
-};
+use pliant::output::{BodyBox, BodySurface, ModalFileRecord, Monitor, OutputPlan, OutputSet, RunReport, ViewerError, ViewerTarget};
 use rerun::external::re_log_types::LogMsg;
 use std::collections::BTreeMap;
 use std::error::Error;
@@ -30,7 +28,7 @@ fn hub_with_two_panels() -> Result<(System, State, OutputPlan), Box<dyn Error>> 
     let (file, modal) = ModalFile::load_body(&path)?;
     let count = modal.mode_count();
     let numbers: Vec<usize> = (1..=count).collect();
-    let surface = Arc::new(Surface::from(file.read_surface(&(0..count).collect::<Vec<_>>())?));
+    let surface = Arc::new(file.read_surface(&(0..count).collect::<Vec<_>>())?);
     let (integrals, modal) = (Arc::new(ModalIntegrals::of(&modal)), Arc::new(modal));
     let hub = BodyDefinition {
         name: "hub".into(),

@@ -50,7 +50,7 @@ fn body_momentum(system: &System, state: &State, workspace: &Workspace, k: usize
         }
         (BodyKind::Rigid(inertia), _) => {
             let momentum = inertia.times(&velocity);
-            let first_moment = Vector3::new(inertia.coupling[(2, 1)], inertia.coupling[(0, 2)], inertia.coupling[(1, 0)]);
+            let first_moment = inertia.first_moment();
             (momentum, first_moment, velocity.dot(&momentum))
         }
         (BodyKind::Flexible(_), None) => (Vector6::zeros(), Vector3::zeros(), 0.0),

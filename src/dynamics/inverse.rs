@@ -241,7 +241,7 @@ impl NewtonEuler {
                 f - external
             }
             (BodyKind::Rigid(inertia), _) => {
-                let c = Vector3::new(inertia.coupling[(2, 1)], inertia.coupling[(0, 2)], inertia.coupling[(1, 0)]);
+                let c = inertia.first_moment();
                 let moment = inertia.rotational * spin + c.cross(&acceleration) + omega.cross(&(inertia.rotational * omega));
                 let push = acceleration * inertia.translational[(0, 0)] + spin.cross(&c) + omega.cross(&omega.cross(&c));
                 spatial(&moment, &push) - external

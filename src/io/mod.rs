@@ -31,5 +31,4 @@ pub use header::{Header, NodeMassKind};
 pub use health::{Bound, HealthReport, Rule, RuleResult, Verdict};
 pub use modal_check::{Examination, examine};
 pub use modal_file::{Coupling, InterfaceSupport, ModalFile, ModeKind};
-pub use modal_mesh::{StressLocation, StressModes, SurfaceMesh};
 pub use results_file::{ResultsError, ResultsFile};

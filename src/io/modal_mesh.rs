@@ -5,45 +5,15 @@
 use super::array::ElementType;
 use super::error::ModalFileError;
 use super::modal_file::{ModalFile, vectors};
+use crate::model::surface::{StressModes, StressPlace, Surface};
 use nalgebra::Vector3;
-
-/// Where stress values sit.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum StressLocation {
-    /// One value per surface node.
-    Node,
-    /// One value per surface triangle: that of the cell behind it, so that values of different materials never mix.
-    Triangle,
-}
-
-/// Stress per unit modal coordinate on the surface.
-#[derive(Debug, Clone)]
-pub struct StressModes {
-    /// Where the values sit.
-    pub location: StressLocation,
-    /// xx yy zz xy yz xz (Pa per unit modal coordinate), per selected mode, per surface node or triangle.
-    pub values: Vec<Vec<[f32; 6]>>,
-}
-
-/// The outer skin of a flexible body with its modes.
-#[derive(Debug, Clone)]
-pub struct SurfaceMesh {
-    /// Undeformed positions (m, body axes) of the S surface and interface nodes.
-    pub points: Vec<[f64; 3]>,
-    /// Outward triangles over `points`.
-    pub triangles: Vec<[u32; 3]>,
-    /// Displacement (m per unit modal coordinate), per selected mode, per surface node.
-    pub displacement: Vec<Vec<[f32; 3]>>,
-    /// Stress, where the file has it.
-    pub stress: Option<StressModes>,
-}
 
 impl ModalFile {
     /// The surface with the modes `modes` (0-based, in that order).
     ///
     /// # Errors
     /// If a dataset is missing, of another type or shape, damaged or not finite, a mode is out of range, or a triangle belongs to no cell.
-    pub fn read_surface(&self, modes: &[usize]) -> Result<SurfaceMesh, ModalFileError> {
+    pub fn read_surface(&self, modes: &[usize]) -> Result<Surface, ModalFileError> {
         modes.iter().try_for_each(|&mode| self.check_mode(mode))?;
         let (nodes, surface) = (self.header().node_count, self.header().surface_nodes);
         let points = self.sized("mesh/points", &[nodes, 3], "(nodes, 3)")?.read_real_rows(0..surface)?;
@@ -57,7 +27,7 @@ impl ModalFile {
             Some(location) => Some(self.read_stress(location, modes, &triangles)?),
             None => None,
         };
-        Ok(SurfaceMesh { points: points.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect(), triangles, displacement, stress })
+        Ok(Surface { points: points.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect(), triangles, displacement, stress })
     }
 
     /// Displacement (m per unit modal coordinate, body axes) of one node in every mode, length n.
@@ -90,14 +60,14 @@ impl ModalFile {
     ///
     /// # Errors
     /// If the attribute is missing or unknown.
-    pub fn stress_location(&self) -> Result<Option<StressLocation>, ModalFileError> {
+    pub fn stress_location(&self) -> Result<Option<StressPlace>, ModalFileError> {
         const GROUP: &str = "modes/stress";
         if !self.file.has(GROUP) {
             return Ok(None);
         }
         match self.file.text(GROUP, "location")?.as_str() {
-            "node" => Ok(Some(StressLocation::Node)),
-            "cell" => Ok(Some(StressLocation::Triangle)),
+            "node" => Ok(Some(StressPlace::Node)),
+            "cell" => Ok(Some(StressPlace::Triangle)),
             other => Err(self.wrong_value("modes/stress@location", &format!("\"{other}\""), "node or cell", "state where the stress sits")),
         }
     }
@@ -126,10 +96,10 @@ impl ModalFile {
         Ok((dataset.read_indices(self.header().node_count)?, per_cell))
     }
 
-    fn read_stress(&self, location: StressLocation, modes: &[usize], triangles: &[[u32; 3]]) -> Result<StressModes, ModalFileError> {
+    fn read_stress(&self, location: StressPlace, modes: &[usize], triangles: &[[u32; 3]]) -> Result<StressModes, ModalFileError> {
         let owners = match location {
-            StressLocation::Node => None,
-            StressLocation::Triangle => Some(self.owning_cells(triangles)?),
+            StressPlace::Node => None,
+            StressPlace::Triangle => Some(self.owning_cells(triangles)?),
         };
         let rows = self.stress_rows(location)?;
         let mut values = Vec::with_capacity(modes.len());
@@ -143,14 +113,14 @@ impl ModalFile {
                 }
             });
         }
-        Ok(StressModes { location, values })
+        Ok(StressModes { place: location, values })
     }
 
     /// Rows of a stress dataset: N, or E for stress per cell.
-    pub(super) fn stress_rows(&self, location: StressLocation) -> Result<usize, ModalFileError> {
+    pub(super) fn stress_rows(&self, location: StressPlace) -> Result<usize, ModalFileError> {
         match location {
-            StressLocation::Node => Ok(self.header().node_count),
-            StressLocation::Triangle => Ok(self.cell_shape()?.0),
+            StressPlace::Node => Ok(self.header().node_count),
+            StressPlace::Triangle => Ok(self.cell_shape()?.0),
         }
     }
 

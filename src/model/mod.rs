@@ -9,6 +9,7 @@ pub mod hinge;
 pub mod load;
 pub mod modal_body;
 pub mod state;
+pub mod surface;
 pub mod time_function;
 
 pub use error::ModelError;
@@ -16,6 +17,7 @@ pub use flexible_body::{Attachment, FlexibleBody, InertiaOrder};
 pub use hinge::{Hinge, HingeKind};
 pub use load::{Load, LoadAxes, LoadPoint};
 pub use state::State;
+pub use surface::Surface;
 pub use time_function::TimeFunction;
 
 use crate::spatial::SpatialInertia;

@@ -25,5 +25,4 @@ pub use evaluation::Evaluation;
 pub use plan::{BodyBox, BodySurface, ModalFileRecord, Monitor, OutputPlan, PlanError};
 pub use report::RunReport;
 pub use set::OutputSet;
-pub use surface::Surface;
 pub use viewer::{ViewerError, ViewerStream, ViewerTarget};

@@ -3,12 +3,12 @@
 
 use super::frame::OutputFrame;
 use super::plan::{BodyBox, OutputPlan};
-use super::surface::Surface;
 use super::tracker::Event;
 use crate::dynamics::Workspace;
 use crate::dynamics::sweep::pose_outward::pose_outward;
 use crate::dynamics::world::{WorldFrame, hinge_frame, world_frames};
 use crate::integrate::Sample;
+use crate::model::Surface;
 use crate::model::{Body, BodyKind, HingeKind, State, System};
 use crate::spatial::rotation::quaternion_of_matrix;
 use crate::spatial::shift::{angular, linear};
@@ -153,7 +153,7 @@ fn equivalent_box(body: &Body) -> Option<BoxShape> {
     if mass <= 0.0 {
         return None;
     }
-    let c = Vector3::new(inertia.coupling[(2, 1)], inertia.coupling[(0, 2)], inertia.coupling[(1, 0)]) / mass;
+    let c = inertia.first_moment() / mass;
     let about_center = inertia.rotational - (Matrix3::identity() * c.norm_squared() - c * c.transpose()) * mass;
     // to the axes of B, so that a body with principal axes there gets a box along them
     let to_b = body.frame_rotation.transpose();

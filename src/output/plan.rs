@@ -2,7 +2,7 @@
 
 pub use crate::scene::Monitor;
 
-use super::surface::Surface;
+use crate::model::Surface;
 use crate::model::System;
 use std::sync::Arc;
 use thiserror::Error;

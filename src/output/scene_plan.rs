@@ -1,9 +1,9 @@
 //! From a scene to the plan of its outputs: surfaces are read here, and only where a picture or a stress figure wants them.
 
 use super::plan::{BodyBox, BodySurface, ModalFileRecord, OutputPlan};
-use super::surface::Surface;
 use crate::io::ModalFileError;
 use crate::model::BodyKind;
+use crate::model::Surface;
 use crate::scene::{Monitor, Scene};
 use std::collections::HashMap;
 use std::path::PathBuf;
@@ -31,7 +31,7 @@ pub fn plan(scene: &Scene, picture: bool) -> Result<OutputPlan, ModalFileError> 
             let surface = match shared.get(&key) {
                 Some(surface) => Arc::clone(surface),
                 None => {
-                    let surface = Arc::new(Surface::from(selection.file.read_surface(&selection.modes)?));
+                    let surface = Arc::new(selection.file.read_surface(&selection.modes)?);
                     shared.insert(key, Arc::clone(&surface));
                     surface
                 }
@@ -45,8 +45,7 @@ pub fn plan(scene: &Scene, picture: bool) -> Result<OutputPlan, ModalFileError> 
             // centred on the mass, as the cuboid of equal inertia would be
             let center = match &body.kind {
                 BodyKind::Rigid(inertia) if body.mass() > 0.0 => {
-                    let c =
-                        nalgebra::Vector3::new(inertia.coupling[(2, 1)], inertia.coupling[(0, 2)], inertia.coupling[(1, 0)]) / body.mass();
+                    let c = inertia.first_moment() / body.mass();
                     body.frame_rotation.tr_mul(&(c - body.frame_position))
                 }
                 _ => nalgebra::Vector3::zeros(),

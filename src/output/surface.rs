@@ -3,50 +3,7 @@
 //! Stress tensors are linear in the modal coordinates and are summed as tensors; the von Mises value is that of the sum, since those
 //! of single modes do not add. Neither function allocates.
 
-/// Where stress values sit.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum StressPlace {
-    /// One value per surface node.
-    Node,
-    /// One value per surface triangle: that of the cell behind it.
-    Triangle,
-}
-
-/// Stress per unit modal coordinate.
-#[derive(Debug, Clone)]
-pub struct StressShapes {
-    /// Where the values sit.
-    pub place: StressPlace,
-    /// xx yy zz xy yz xz (Pa per unit modal coordinate), per mode, per node or triangle.
-    pub values: Vec<Vec<[f32; 6]>>,
-}
-
-/// Outer skin of a flexible body, one shape per retained mode.
-#[derive(Debug, Clone)]
-pub struct Surface {
-    /// Undeformed positions (m, body axes).
-    pub points: Vec<[f64; 3]>,
-    /// Outward triangles over `points`.
-    pub triangles: Vec<[u32; 3]>,
-    /// Displacement (m per unit modal coordinate), per mode, per point.
-    pub displacement: Vec<Vec<[f32; 3]>>,
-    /// Stress, where the modal file has it.
-    pub stress: Option<StressShapes>,
-}
-
-#[cfg(feature = "hdf5")]
-impl From<crate::io::SurfaceMesh> for Surface {
-    fn from(mesh: crate::io::SurfaceMesh) -> Self {
-        let stress = mesh.stress.map(|stress| StressShapes {
-            place: match stress.location {
-                crate::io::StressLocation::Node => StressPlace::Node,
-                crate::io::StressLocation::Triangle => StressPlace::Triangle,
-            },
-            values: stress.values,
-        });
-        Self { points: mesh.points, triangles: mesh.triangles, displacement: mesh.displacement, stress }
-    }
-}
+use crate::model::surface::{StressModes, StressPlace, Surface};
 
 /// Largest von Mises stress of a surface and where it sits.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -74,8 +31,8 @@ impl Surface {
     pub fn stress_count(&self) -> usize {
         match &self.stress {
             None => 0,
-            Some(StressShapes { place: StressPlace::Node, .. }) => self.points.len(),
-            Some(StressShapes { place: StressPlace::Triangle, .. }) => self.triangles.len(),
+            Some(StressModes { place: StressPlace::Node, .. }) => self.points.len(),
+            Some(StressModes { place: StressPlace::Triangle, .. }) => self.triangles.len(),
         }
     }
 
@@ -164,7 +121,7 @@ mod tests {
             points: vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0]],
             triangles: vec![[0, 1, 2], [1, 3, 2]],
             displacement: vec![vec![[0.0, 0.0, 1.0]; 4], vec![[0.5, 0.0, 0.0]; 4]],
-            stress: Some(StressShapes {
+            stress: Some(StressModes {
                 place: StressPlace::Node,
                 values: vec![
                     vec![[10.0, 0.0, 0.0, 0.0, 0.0, 0.0], [0.0; 6], [0.0, 0.0, 0.0, 1.0, 2.0, 3.0], [0.0; 6]],
@@ -191,7 +148,7 @@ mod tests {
     #[test]
     fn a_point_takes_the_largest_triangle_around_it() {
         let mut surface = bent();
-        surface.stress = Some(StressShapes {
+        surface.stress = Some(StressModes {
             place: StressPlace::Triangle,
             values: vec![vec![[1.0, 0.0, 0.0, 0.0, 0.0, 0.0], [3.0, 0.0, 0.0, 0.0, 0.0, 0.0]]],
         });

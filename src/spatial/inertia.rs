@@ -22,6 +22,13 @@ impl SpatialInertia {
         Self { rotational: *inertia, coupling: skew(first_moment), translational: Matrix3::from_diagonal_element(mass) }
     }
 
+    /// First moment `m c` (kg m) of a rigid body's inertia.
+    #[inline]
+    #[must_use]
+    pub fn first_moment(&self) -> Vector3<f64> {
+        Vector3::new(self.coupling[(2, 1)], self.coupling[(0, 2)], self.coupling[(1, 0)])
+    }
+
     /// `P x`.
     #[inline]
     #[must_use]

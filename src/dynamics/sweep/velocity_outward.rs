@@ -8,7 +8,7 @@ use super::pose_outward::PoseScratch;
 use crate::model::hinge::MAX_RATES;
 use crate::model::{BodyKind, State, System};
 use crate::spatial::shift::{angular, linear, motion_to, rotate, rotate_back, spatial};
-use nalgebra::{Vector3, Vector6};
+use nalgebra::Vector6;
 
 /// Velocity of one body and what depends on it.
 #[derive(Debug, Clone, Copy, Default)]
@@ -89,7 +89,7 @@ pub fn velocity_outward(system: &System, state: &State, pose: &PoseScratch, out:
         match &body.kind {
             BodyKind::Rigid(inertia) => {
                 let w = angular(&V_hinge);
-                let first_moment = Vector3::new(inertia.coupling[(2, 1)], inertia.coupling[(0, 2)], inertia.coupling[(1, 0)]);
+                let first_moment = inertia.first_moment();
                 result.b = spatial(&w.cross(&(inertia.rotational * w)), &w.cross(&w.cross(&first_moment)));
             }
             BodyKind::Flexible(flexible) => {
