@@ -12,3 +12,4 @@ mod nodal_sums;
 mod published;
 mod published_flexible;
 mod scaling;
+mod stiff;
