@@ -19,6 +19,10 @@
 //! The matrix is that of the inertia sweep with `Lambda = 1 + h g c + (h g)^2 k` and the like on hinges; it is swept once per step, at
 //! the step's start, since W-methods have their order only if all stages share one `A`. A stage costs one plain evaluation
 //! and two sweeps ([`response`]). K of a full modal stiffness is its diagonal. Prescribed hinges have no rows, and df/dt no term.
+//!
+//! What is not resolved is damped: an undamped mode loses of its energy in one period, from |R| on the imaginary axis, 8e-8 at 1000
+//! steps per period, 8e-5 at 100, 1e-3 at 40, 1e-2 at 20, 0.3 at 5.
+//!
 //! Sources: Rang and Angermann 2005 for the method; DESIGN 3.6 for its use here.
 
 use super::Stepper;
