@@ -1,10 +1,14 @@
-//! An evaluation allocates nothing: counted by the allocator itself, in a binary of its own so that nothing else counts.
+//! An evaluation and a step allocate nothing: counted by the allocator itself, in a binary of its own so that nothing else counts.
 
 mod support;
 
 use nalgebra::Vector6;
 use pliant::dynamics::hinge_load::hinge_loads;
 use pliant::dynamics::{Workspace, forward_dynamics};
+use pliant::integrate::chart::Chart;
+use pliant::integrate::step_control::Tolerance;
+use pliant::integrate::w_tableau::ROS34PW2;
+use pliant::integrate::{RosenbrockW, Stepper};
 use pliant::model::modal_body::Boundary;
 use std::alloc::{GlobalAlloc, Layout, System as SystemAllocator};
 use std::cell::Cell;
@@ -66,5 +70,25 @@ fn evaluations_and_hinge_loads_allocate_nothing() {
             let allocations = count(|| (0..3).for_each(|_| evaluate()));
             assert_eq!(allocations, 0, "base {base}, boundary {boundary:?}");
         }
+    }
+}
+
+#[test]
+fn steps_of_the_linearly_implicit_method_allocate_nothing() {
+    let recipe = Recipe { bodies: 12, prescribed: 0.2, ..Recipe::default() };
+    for seed in 0..5 {
+        let (system, mut start) = random_tree(seed, &recipe).build().unwrap();
+        start.apply_prescribed(&system);
+        let mut chart = Chart::new(&system, &start);
+        let mut stepper = RosenbrockW::new(ROS34PW2, Tolerance { relative: 1e-3, absolute: 1e-3 }, &chart);
+        stepper.restart(&mut chart).unwrap();
+        let mut step = || {
+            stepper.attempt(&mut chart, 1e-4).unwrap();
+            stepper.accept(&mut chart);
+        };
+        step();
+        // a move of the base to the next chart keeps its vectors
+        let allocations = count(|| (0..3).for_each(|_| step()));
+        assert_eq!(allocations, 0, "seed {seed}");
     }
 }

@@ -5,7 +5,7 @@ use super::failure::{Failure, with_causes};
 use super::report::number;
 use super::run_report;
 use crate::integrate::simulate::Method;
-use crate::integrate::stability::{fastest_mode, stable_step};
+use crate::integrate::stability::fastest_mode;
 use crate::integrate::{Flow, Observer, Outcome, Sample, Settings, simulate};
 use crate::output::{OutputPlan, OutputSet};
 use crate::scene::{Overrides, Scene, SceneError, assemble};
@@ -50,7 +50,7 @@ pub fn run(arguments: &RunArguments, output: &mut dyn Write) -> Result<(), Failu
     let summary = simulate(&scene.system, &scene.state, &settings, &mut [&mut outputs, &mut progress]);
     let wall = started.elapsed();
     progress.bar.finish_and_clear();
-    let report = outputs.finish(&summary, scene.method.tableau().name, wall, left_out);
+    let report = outputs.finish(&summary, scene.method.name(), wall, left_out);
 
     if arguments.json {
         let text = serde_json::to_string_pretty(&report).map_err(|e| Failure::Output(e.into()))?;
@@ -174,7 +174,9 @@ fn announce(scene: &Scene, settings: &Settings, left_out: &[String]) {
     let system = &scene.system;
     let how = match settings.method {
         Method::RungeKutta4 { step } => format!("fixed step {} s", number(step)),
-        Method::DormandPrince { tolerance, .. } => format!("relative tolerance {:e}", tolerance.relative),
+        Method::DormandPrince { tolerance, .. } | Method::RosenbrockW { tolerance, .. } => {
+            format!("relative tolerance {:e}", tolerance.relative)
+        }
     };
     let mut lines = vec![format!(
         "{}: {} bodies, {} hinge rates, {} modes; {} s with {}, {how}",
@@ -183,10 +185,10 @@ fn announce(scene: &Scene, settings: &Settings, left_out: &[String]) {
         system.velocity_count,
         system.modal_count,
         number(settings.duration),
-        settings.method.tableau().name,
+        settings.method.name(),
     )];
     if let Some(mode) = fastest_mode(system) {
-        let stable = stable_step(&settings.method.tableau(), mode.frequency_hz, mode.damping_ratio);
+        let stable = settings.method.stable_step(mode.frequency_hz, mode.damping_ratio);
         lines.push(format!(
             "fastest retained mode: mode {} of \"{}\" at {} Hz; stable step {} s",
             mode.mode,

@@ -2,7 +2,8 @@
 //!
 //! With its frame B held, a body's modal inertia is `D = 1 + sum over children c of Y_c' S_c Y_c`, `Y_c = Pi(O_c)` and `S_c = P+_c`: each
 //! child adds a term of rank 6. Each is one Woodbury update, `D_c^-1 = D_b^-1 - F N F'`, `F = D_b^-1 Y'`, `N = (1 + S Y F)^-1 S`,
-//! which needs no inverse of the singular S. Source: Paper Eq. 32 in its first line; the update is DESIGN 3.3.
+//! which needs no inverse of the singular S. A linearly implicit integrator has another diagonal, `D = Lambda + sum Y' S Y`; its inverse
+//! is where the updates then start. Source: Paper Eq. 32 in its first line; the update is DESIGN 3.3, the diagonal 3.6.
 #![expect(non_snake_case, reason = "symbols follow the table in dynamics/mod.rs")]
 
 use crate::spatial::SpatialInertia;
@@ -21,6 +22,8 @@ struct Update {
 pub struct ModalBlock {
     updates: Vec<Update>,
     used: usize,
+    /// `Lambda^-1`, empty for 1.
+    inverse_diagonal: Vec<f64>,
 }
 
 /// An inertia that should be positive definite has no inverse.
@@ -44,12 +47,15 @@ impl ModalBlock {
         Self {
             updates: vec![Update { Y: vec![Vector6::zeros(); n], F: vec![Vector6::zeros(); n], N: Matrix6::zeros() }; children],
             used: 0,
+            inverse_diagonal: Vec::new(),
         }
     }
 
-    /// Starts from the body alone, whose modes are orthonormal.
-    pub fn begin(&mut self) {
+    /// Starts from the body alone, whose modes are orthonormal; `diagonal` stands in for their unit mass where there is one.
+    pub fn begin(&mut self, diagonal: Option<&[f64]>) {
         self.used = 0;
+        self.inverse_diagonal.clear();
+        self.inverse_diagonal.extend(diagonal.unwrap_or_default().iter().map(|d| 1.0 / d));
     }
 
     /// Adds a child: `fill` writes `Y`, one row per mode, and `S` is the inertia that the body feels there.
@@ -62,7 +68,7 @@ impl ModalBlock {
         let update = open.first_mut().ok_or(SingularBlock)?;
         fill(&mut update.Y);
         update.F.copy_from_slice(&update.Y);
-        solve_rows(done, &mut update.F);
+        solve_rows(&self.inverse_diagonal, done, &mut update.F);
         let S = S.matrix();
         let inner = Matrix6::identity() + S * outer_sum(&update.Y, &update.F);
         let N = inner.lu().solve(&S).ok_or(SingularBlock)?;
@@ -73,11 +79,12 @@ impl ModalBlock {
 
     /// `x <- D^-1 x` for n x 6, one row per mode.
     pub fn solve_rows(&self, x: &mut [Vector6<f64>]) {
-        solve_rows(&self.updates[..self.used], x);
+        solve_rows(&self.inverse_diagonal, &self.updates[..self.used], x);
     }
 
     /// `x <- D^-1 x` for one number per mode.
     pub fn solve(&self, x: &mut [f64]) {
+        self.inverse_diagonal.iter().zip(x.iter_mut()).for_each(|(d, x)| *x *= d);
         for update in &self.updates[..self.used] {
             let t = update.N * update.Y.iter().zip(x.iter()).map(|(y, x)| y * *x).sum::<Vector6<f64>>();
             update.F.iter().zip(x.iter_mut()).for_each(|(f, x)| *x -= f.dot(&t));
@@ -85,7 +92,8 @@ impl ModalBlock {
     }
 }
 
-fn solve_rows(updates: &[Update], x: &mut [Vector6<f64>]) {
+fn solve_rows(inverse_diagonal: &[f64], updates: &[Update], x: &mut [Vector6<f64>]) {
+    inverse_diagonal.iter().zip(x.iter_mut()).for_each(|(d, x)| *x *= *d);
     for update in updates {
         // F' of the right-hand side is Y' of what the earlier updates have left in x
         let t = update.N * outer_sum(&update.Y, x);
@@ -112,24 +120,27 @@ mod tests {
         inertias[1].subtract_outer(&inertias[1].times(&Vector6::ith(1, 1.0)), inertias[1].rotational[(1, 1)]);
         let matrix = |rows: &[Vector6<f64>]| DMatrix::from_fn(n, 6, |i, a| rows[i][a]);
         let wide = |s: &SpatialInertia| DMatrix::from_fn(6, 6, |i, j| s.matrix()[(i, j)]);
-        let mut dense = DMatrix::identity(n, n);
-        for (y, s) in y.iter().zip(&inertias) {
-            dense += matrix(y) * wide(s) * matrix(y).transpose();
-        }
-
         let mut block = ModalBlock::new(n, 2);
-        block.begin();
-        for (y, s) in y.iter().zip(&inertias) {
-            block.add_child(|out| out.copy_from_slice(y), s).unwrap();
+        // the plain block last: nothing of the other diagonal may stay behind
+        let stiff: Vec<f64> = (0..n).map(|i| 1.0 + 3.0 * i as f64).collect();
+        for diagonal in [Some(stiff.as_slice()), None] {
+            let mut dense = DMatrix::from_fn(n, n, |i, j| if i == j { diagonal.map_or(1.0, |d| d[i]) } else { 0.0 });
+            for (y, s) in y.iter().zip(&inertias) {
+                dense += matrix(y) * wide(s) * matrix(y).transpose();
+            }
+            block.begin(diagonal);
+            for (y, s) in y.iter().zip(&inertias) {
+                block.add_child(|out| out.copy_from_slice(y), s).unwrap();
+            }
+            let right = rows(5.0);
+            let expected = dense.clone().lu().solve(&matrix(&right)).unwrap();
+            let mut found = right.clone();
+            block.solve_rows(&mut found);
+            // condition of D and of the inner matrices is below 1e3 for these numbers
+            assert!((matrix(&found) - &expected).abs().max() < 1e4 * f64::EPSILON * expected.abs().max());
+            let mut first: Vec<f64> = right.iter().map(|r| r[0]).collect();
+            block.solve(&mut first);
+            assert!(first.iter().zip(found.iter()).all(|(a, b)| (a - b[0]).abs() < 1e4 * f64::EPSILON * expected.abs().max()));
         }
-        let right = rows(5.0);
-        let expected = dense.clone().lu().solve(&matrix(&right)).unwrap();
-        let mut found = right.clone();
-        block.solve_rows(&mut found);
-        // condition of D and of the inner matrices is below 1e3 for these numbers
-        assert!((matrix(&found) - &expected).abs().max() < 1e4 * f64::EPSILON * expected.abs().max());
-        let mut first: Vec<f64> = right.iter().map(|r| r[0]).collect();
-        block.solve(&mut first);
-        assert!(first.iter().zip(found.iter()).all(|(a, b)| (a - b[0]).abs() < 1e4 * f64::EPSILON * expected.abs().max()));
     }
 }

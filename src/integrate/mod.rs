@@ -1,18 +1,23 @@
-//! Time: explicit Runge-Kutta methods on the manifold of hinge rotations, step control, and the loop that drives them.
+//! Time: explicit and linearly implicit Runge-Kutta methods on the manifold of hinge rotations, step control, and the loop that drives
+//! them.
 //!
 //! Every method integrates the same local problem ([`chart::Chart`]): within a step, hinge rotations are rotation vectors from the
-//! step's start, so that quaternions stay of unit length and each method keeps its order. A linearly implicit method
-//! belongs beside [`runge_kutta`], behind the same [`Stepper`] interface.
+//! step's start, so that quaternions stay of unit length and each method keeps its order. [`runge_kutta`] holds the explicit methods,
+//! [`rosenbrock_w`] the linearly implicit one that stiff modes do not slow; [`choice`] decides between them.
 
 pub mod chart;
+pub mod choice;
 pub mod observer;
+pub mod rosenbrock_w;
 pub mod runge_kutta;
 pub mod simulate;
 pub mod stability;
 pub mod step_control;
 pub mod tableau;
+pub mod w_tableau;
 
 pub use observer::{Flow, Observer, Sample};
+pub use rosenbrock_w::RosenbrockW;
 pub use runge_kutta::RungeKutta;
 pub use simulate::{Outcome, RunFailure, Settings, Summary, simulate};
 

@@ -40,15 +40,6 @@ impl RungeKutta {
         }
     }
 
-    fn combine(y0: &[f64], h: f64, weights: &[f64], k: &[Vec<f64>], out: &mut [f64]) {
-        out.copy_from_slice(y0);
-        for (w, k) in weights.iter().zip(k) {
-            if *w != 0.0 {
-                out.iter_mut().zip(k).for_each(|(o, k)| *o += h * w * k);
-            }
-        }
-    }
-
     /// y at the fraction `theta` of the step, entry by entry.
     fn dense(&self, theta: f64, i: usize) -> f64 {
         let last = self.k.len() - 1;
@@ -59,6 +50,16 @@ impl RungeKutta {
         let close = change - self.h * self.k[last][i] - begin;
         let extra: f64 = self.tableau.dense.iter().zip(&self.k).map(|(d, k)| d * k[i]).sum::<f64>() * self.h;
         self.y0[i] + theta * (change + rest * (begin + theta * (close + rest * extra)))
+    }
+}
+
+/// `out = y0 + h sum_j weights_j k_j`.
+pub(super) fn combine(y0: &[f64], h: f64, weights: &[f64], k: &[Vec<f64>], out: &mut [f64]) {
+    out.copy_from_slice(y0);
+    for (w, k) in weights.iter().zip(k) {
+        if *w != 0.0 {
+            out.iter_mut().zip(k).for_each(|(o, k)| *o += h * w * k);
+        }
     }
 }
 
@@ -78,10 +79,10 @@ impl Stepper for RungeKutta {
         let stages = self.tableau.b.len();
         chart.base_vector(&mut self.y0);
         for i in 1..stages {
-            Self::combine(&self.y0, h, self.tableau.a[i], &self.k, &mut self.y);
+            combine(&self.y0, h, self.tableau.a[i], &self.k, &mut self.y);
             chart.rate(start + self.tableau.c[i] * h, &self.y, &mut self.k[i])?;
         }
-        Self::combine(&self.y0, h, self.tableau.b, &self.k, &mut self.y1);
+        combine(&self.y0, h, self.tableau.b, &self.k, &mut self.y1);
         chart.rate(start + h, &self.y1, &mut self.k[stages])?;
         let Some(tolerance) = &self.tolerance else {
             return Ok(None);

@@ -2,10 +2,12 @@
 
 use super::chart::Chart;
 use super::observer::{Flow, Observer, Sample};
+use super::rosenbrock_w::RosenbrockW;
 use super::runge_kutta::RungeKutta;
 use super::stability::{fastest_mode, stable_step};
 use super::step_control::{Controller, Tolerance};
 use super::tableau::Tableau;
+use super::w_tableau::ROS34PW2;
 use super::{Stepper, tableau};
 use crate::dynamics::{DynamicsError, Workspace, forward_dynamics};
 use crate::model::{State, System};
@@ -18,15 +20,38 @@ pub enum Method {
     RungeKutta4 { step: f64 },
     /// Dormand-Prince 5(4) with error control; `largest_step` in s.
     DormandPrince { tolerance: Tolerance, largest_step: f64 },
+    /// The linearly implicit ROS34PW2 with error control; `largest_step` in s.
+    RosenbrockW { tolerance: Tolerance, largest_step: f64 },
 }
 
 impl Method {
-    /// Coefficients of the method.
+    /// Name in scenes and reports.
     #[must_use]
-    pub fn tableau(&self) -> Tableau {
+    pub fn name(&self) -> &'static str {
+        self.tableau().map_or(ROS34PW2.name, |t| t.name)
+    }
+
+    /// Coefficients of an explicit method.
+    #[must_use]
+    pub fn tableau(&self) -> Option<Tableau> {
         match self {
-            Self::RungeKutta4 { .. } => tableau::RK4,
-            Self::DormandPrince { .. } => tableau::DORMAND_PRINCE,
+            Self::RungeKutta4 { .. } => Some(tableau::RK4),
+            Self::DormandPrince { .. } => Some(tableau::DORMAND_PRINCE),
+            Self::RosenbrockW { .. } => None,
+        }
+    }
+
+    /// Largest stable step (s) with a mode of `frequency_hz` and `damping_ratio`; infinite for an implicit method.
+    #[must_use]
+    pub fn stable_step(&self, frequency_hz: f64, damping_ratio: f64) -> f64 {
+        self.tableau().map_or(f64::INFINITY, |t| stable_step(&t, frequency_hz, damping_ratio))
+    }
+
+    fn stepper(&self, chart: &Chart<'_>) -> Box<dyn Stepper> {
+        match *self {
+            Self::RungeKutta4 { .. } => Box::new(RungeKutta::new(tableau::RK4, None, chart)),
+            Self::DormandPrince { tolerance, .. } => Box::new(RungeKutta::new(tableau::DORMAND_PRINCE, Some(tolerance), chart)),
+            Self::RosenbrockW { tolerance, .. } => Box::new(RosenbrockW::new(ROS34PW2, tolerance, chart)),
         }
     }
 }
@@ -112,9 +137,11 @@ pub fn simulate(system: &System, start: &State, settings: &Settings, observers: 
     let mut chart = Chart::new(system, start);
     let (tolerance, step, largest) = match settings.method {
         Method::RungeKutta4 { step } => (None, step, step),
-        Method::DormandPrince { tolerance, largest_step } => (Some(tolerance), first_step(system, settings, largest_step), largest_step),
+        Method::DormandPrince { tolerance, largest_step } | Method::RosenbrockW { tolerance, largest_step } => {
+            (Some(tolerance), first_step(system, settings, largest_step), largest_step)
+        }
     };
-    let mut stepper = RungeKutta::new(settings.method.tableau(), tolerance, &chart);
+    let mut stepper = settings.method.stepper(&chart);
     let mut run = Run {
         chart: &mut chart,
         controller: stepper.controlled_order().map(Controller::new),
@@ -129,7 +156,7 @@ pub fn simulate(system: &System, start: &State, settings: &Settings, observers: 
         evaluations: 0,
         local_error: 0.0,
     };
-    let outcome = run.go(&mut stepper, observers);
+    let outcome = run.go(stepper.as_mut(), observers);
     let Run { steps, rejected, evaluations, local_error, .. } = run;
     Summary {
         outcome,
@@ -144,7 +171,7 @@ pub fn simulate(system: &System, start: &State, settings: &Settings, observers: 
 
 /// A cautious first step: the controller lets it grow fivefold a step.
 fn first_step(system: &System, settings: &Settings, largest: f64) -> f64 {
-    let stable = fastest_mode(system).map_or(f64::INFINITY, |m| stable_step(&settings.method.tableau(), m.frequency_hz, m.damping_ratio));
+    let stable = fastest_mode(system).map_or(f64::INFINITY, |m| settings.method.stable_step(m.frequency_hz, m.damping_ratio));
     let cautious = (1e-3 * settings.duration).min(0.1 * stable).min(1e-2);
     cautious.min(largest)
 }

@@ -3,6 +3,7 @@
 use super::error::{SceneError, Source};
 use super::locate::Step;
 use super::spec::SimulationSpec;
+use crate::integrate::choice::choose;
 use crate::integrate::simulate::Method;
 use crate::integrate::stability::{fastest_mode, stable_step};
 use crate::integrate::step_control::Tolerance;
@@ -10,9 +11,13 @@ use crate::integrate::tableau;
 use crate::model::System;
 
 /// Integrators by name, with one line of help each.
-pub const INTEGRATORS: [(&str, &str); 3] = [
-    ("auto", "let pliant choose; at present dormand_prince"),
+pub const INTEGRATORS: [(&str, &str); 4] = [
+    ("auto", "rosenbrock_w if the fastest mode would hold dormand_prince to smaller steps, else dormand_prince"),
     ("dormand_prince", "explicit Runge-Kutta pair 5(4) with error control"),
+    (
+        "rosenbrock_w",
+        "linearly implicit, order 3(2) with error control: stiff modes and springs do not limit the step; damps what it does not resolve",
+    ),
     ("rk4", "explicit Runge-Kutta of order 4 with fixed steps ([simulation] step)"),
 ];
 
@@ -35,11 +40,12 @@ pub fn method(spec: &SimulationSpec, name: Option<&str>, system: &System, rate_h
             return Err(source.value(&at(key), format!("{value} must lie between 0 and 1")));
         }
     }
+    let tolerance = Tolerance { relative: spec.relative_tolerance, absolute: spec.absolute_tolerance };
+    let largest_step = spec.largest_step.unwrap_or(f64::INFINITY);
     match name.or(spec.integrator.as_deref()).unwrap_or("auto") {
-        "auto" | "dormand_prince" => Ok(Method::DormandPrince {
-            tolerance: Tolerance { relative: spec.relative_tolerance, absolute: spec.absolute_tolerance },
-            largest_step: spec.largest_step.unwrap_or(f64::INFINITY),
-        }),
+        "auto" => Ok(choose(system, tolerance, largest_step, rate_hz).method),
+        "dormand_prince" => Ok(Method::DormandPrince { tolerance, largest_step }),
+        "rosenbrock_w" => Ok(Method::RosenbrockW { tolerance, largest_step }),
         "rk4" => {
             let stable = fastest_mode(system).map(|m| stable_step(&tableau::RK4, m.frequency_hz, m.damping_ratio));
             let step = spec.step.unwrap_or_else(|| stable.map_or(f64::INFINITY, |h| DEFAULT_SHARE * h).min(1.0 / rate_hz));

@@ -2,7 +2,11 @@
 
 use crate::support::assert_close;
 use crate::support::trees::{Recipe, random_tree};
+use nalgebra::DVector;
 use pliant::dynamics::inverse::NewtonEuler;
+use pliant::dynamics::sweep::inertia_inward::{AddedInertia, InertiaScratch, inertia_inward_with};
+use pliant::dynamics::sweep::pose_outward::{PoseScratch, pose_outward};
+use pliant::dynamics::sweep::response::{ResponseScratch, response};
 use pliant::dynamics::{Workspace, dense, forward_dynamics};
 use pliant::model::modal_body::Boundary;
 use pliant::model::{State, System};
@@ -63,5 +67,46 @@ fn hinge_loads_and_equations_pass_the_independent_audit() {
         let condition = dense::equations(&system, &state).condition();
         assert!(residual.load <= 200.0 * EPS * condition.max(10.0), "{name}: {residual:?}, condition {condition:e}");
         assert!(residual.equation <= 2000.0 * EPS * condition.max(10.0), "{name}: {residual:?}, condition {condition:e}");
+    }
+}
+
+#[test]
+fn response_to_generalised_forces_solves_with_the_mass_matrix_and_what_is_added_to_it() {
+    for (name, system, state) in systems(10) {
+        let equations = dense::equations(&system, &state);
+        let (nv, n) = (system.velocity_count, system.velocity_count + system.modal_count);
+        let mut pose = PoseScratch::new(&system);
+        pose_outward(&system, &state, &mut pose);
+        let mut inertia = InertiaScratch::new(&system);
+        let mut found = ResponseScratch::new(&system);
+        let wave = |i: usize| (1.7 * i as f64 + 0.3).sin();
+        let force: Vec<f64> = (0..n).map(wave).collect();
+        // every block: nothing on some hinges, a full matrix on others
+        let hinge =
+            |k: usize| (k % 3 != 0).then(|| std::array::from_fn(|i| std::array::from_fn(|j| if i == j { 9.0 } else { wave(i + j) })));
+        let added = AddedInertia {
+            modal: (0..system.modal_count).map(|j| 1.0 + 50.0 * (j as f64)).collect(),
+            hinge: (0..system.bodies.len()).map(hinge).collect(),
+        };
+        for added in [None, Some(&added)] {
+            let mut matrix = equations.mass.clone();
+            if let Some(added) = added {
+                added.modal.iter().enumerate().for_each(|(j, x)| matrix[(nv + j, nv + j)] += x - 1.0);
+                for (body, block) in system.bodies.iter().zip(&added.hinge) {
+                    for (i, j) in body.velocity_range().flat_map(|i| body.velocity_range().map(move |j| (i, j))) {
+                        matrix[(i, j)] += block.map_or(0.0, |b| b[i - body.velocity][j - body.velocity]);
+                    }
+                }
+            }
+            let free = matrix.select_rows(&equations.free).select_columns(&equations.free);
+            let right = DVector::from_iterator(equations.free.len(), equations.free.iter().map(|&i| force[i]));
+            let solution = free.lu().solve(&right).unwrap();
+            let mut expected = vec![0.0; n];
+            equations.free.iter().zip(&solution).for_each(|(&i, x)| expected[i] = *x);
+            inertia_inward_with(&system, &pose, added, &mut inertia).unwrap();
+            response(&system, &pose, &inertia, &force[..nv], &force[nv..], &mut found);
+            let found = [&found.hinge[..], &found.modal].concat();
+            assert_close(&found, &expected, 400.0 * EPS * equations.condition().max(10.0), &name);
+        }
     }
 }

@@ -13,3 +13,4 @@ mod nodal_sums;
 mod published;
 mod published_flexible;
 mod scaling;
+mod stiff;

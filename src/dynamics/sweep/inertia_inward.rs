@@ -6,6 +6,9 @@
 //! cancellation: with B held as for any body, `P_B+ = P_rr - mu D^-1 mu'`; the acceleration of O per force at O is then
 //! `Lambda = Pi D^-1 Pi' + X P_B+^-1 X'`, `X = phi* - Pi D^-1 mu'`, a sum of two semidefinite terms, and `P(k') = Lambda^-1`.
 //! Cost: O(bodies + modes), plus O(children^2 modes) per flexible body.
+//!
+//! The same sweep factors `M + N` of a linearly implicit integrator, N block diagonal over modes and hinges ([`AddedInertia`]): `D` of a
+//! hinge becomes `H P H* + N`, the unit modal mass `Lambda`, and every formula above stays as it is.
 #![expect(non_snake_case, reason = "symbols follow the table in dynamics/mod.rs")]
 
 use super::pose_outward::PoseScratch;
@@ -73,6 +76,15 @@ pub struct InertiaScratch {
     pub flexible: Vec<FlexibleElimination>,
 }
 
+/// What a linearly implicit integrator adds to the mass matrix.
+#[derive(Debug, Clone)]
+pub struct AddedInertia {
+    /// `Lambda`: unit modal mass plus what is added, indexed like the modal coordinates.
+    pub modal: Vec<f64>,
+    /// Symmetric positive semidefinite block of each body's hinge rates; none for zero.
+    pub hinge: Vec<Option<[[f64; MAX_RATES]; MAX_RATES]>>,
+}
+
 impl InertiaScratch {
     /// Room for `system`.
     #[must_use]
@@ -113,6 +125,19 @@ impl InertiaScratch {
 /// # Errors
 /// [`DynamicsError`] naming the hinge or body whose inertia is singular.
 pub fn inertia_inward(system: &System, pose: &PoseScratch, out: &mut InertiaScratch) -> Result<(), DynamicsError> {
+    inertia_inward_with(system, pose, None, out)
+}
+
+/// Fills `out` from the poses, for the mass matrix with `added` on its diagonal blocks.
+///
+/// # Errors
+/// [`DynamicsError`] naming the hinge or body whose inertia is singular.
+pub fn inertia_inward_with(
+    system: &System,
+    pose: &PoseScratch,
+    added: Option<&AddedInertia>,
+    out: &mut InertiaScratch,
+) -> Result<(), DynamicsError> {
     for (k, body) in system.bodies.iter().enumerate() {
         out.bodies[k].P = match (&body.kind, pose.bodies[k].flexible) {
             (BodyKind::Rigid(inertia), _) => *inertia,
@@ -121,12 +146,15 @@ pub fn inertia_inward(system: &System, pose: &PoseScratch, out: &mut InertiaScra
     }
     for (k, body) in system.bodies.iter().enumerate().rev() {
         if let Some(index) = pose.bodies[k].flexible {
-            eliminate_modes(pose, k, index, out).map_err(|SingularBlock| DynamicsError::SingularModes { body: body.name.clone() })?;
+            let diagonal = added.map(|a| &a.modal[body.modal_range()]);
+            eliminate_modes(pose, k, index, diagonal, out)
+                .map_err(|SingularBlock| DynamicsError::SingularModes { body: body.name.clone() })?;
         } else {
             out.bodies[k].P_hinge = out.bodies[k].P;
         }
         let own = &mut out.bodies[k];
-        eliminate_hinge(body, &pose.bodies[k].hinge.map, own).map_err(|(rate, inertia, scale)| DynamicsError::SingularHinge {
+        let block = added.and_then(|a| a.hinge[k].as_ref());
+        eliminate_hinge(body, &pose.bodies[k].hinge.map, block, own).map_err(|(rate, inertia, scale)| DynamicsError::SingularHinge {
             hinge: body.hinge.name.clone(),
             parent: body.parent.map_or_else(|| "world".to_owned(), |p| system.bodies[p].name.clone()),
             child: body.name.clone(),
@@ -144,10 +172,16 @@ pub fn inertia_inward(system: &System, pose: &PoseScratch, out: &mut InertiaScra
 }
 
 /// Modes of flexible body `k`: `P_cr+ = P_rr - mu D_fl^-1 mu'` (Eq. 32), moved to O.
-fn eliminate_modes(pose: &PoseScratch, k: usize, index: usize, out: &mut InertiaScratch) -> Result<(), SingularBlock> {
+fn eliminate_modes(
+    pose: &PoseScratch,
+    k: usize,
+    index: usize,
+    diagonal: Option<&[f64]>,
+    out: &mut InertiaScratch,
+) -> Result<(), SingularBlock> {
     let part = &pose.flexible[index];
     let FlexibleElimination { modal_block, mu, gain_modal, moved_children, root } = &mut out.flexible[index];
-    modal_block.begin();
+    modal_block.begin(diagonal);
     mu.copy_from_slice(&part.inertia.row);
     for &child in moved_children.iter() {
         let child_pose = &pose.bodies[child];
@@ -219,8 +253,13 @@ impl RootElimination {
 /// Pivots at or below this multiple of what they were formed from are rounding, not inertia.
 const SINGULAR: f64 = 8.0 * f64::EPSILON;
 
-/// Hinge of a body: `D = H P H*`, `G = P H* D^-1`, `P+ = P - G D G*` (Eq. 33). Errors: (rate, pivot, scale).
-fn eliminate_hinge(body: &Body, map: &[Vector6<f64>; MAX_RATES], own: &mut BodyInertia) -> Result<(), (usize, f64, f64)> {
+/// Hinge of a body: `D = H P H*` and what is `added`, `G = P H* D^-1`, `P+ = P - G D G*` (Eq. 33). Errors: (rate, pivot, scale).
+fn eliminate_hinge(
+    body: &Body,
+    map: &[Vector6<f64>; MAX_RATES],
+    added: Option<&[[f64; MAX_RATES]; MAX_RATES]>,
+    own: &mut BodyInertia,
+) -> Result<(), (usize, f64, f64)> {
     own.P_plus = own.P_hinge;
     let m = body.hinge.kind.rate_count();
     if m == 0 || body.hinge.is_prescribed() {
@@ -237,7 +276,7 @@ fn eliminate_hinge(body: &Body, map: &[Vector6<f64>; MAX_RATES], own: &mut BodyI
     for i in 0..m {
         let scale = turn * map[i].fixed_rows::<3>(0).norm_squared() + travel * map[i].fixed_rows::<3>(3).norm_squared();
         for j in 0..=i {
-            let mut sum = map[i].dot(&U[j]);
+            let mut sum = map[i].dot(&U[j]) + added.map_or(0.0, |n| n[i][j]);
             for c in 0..j {
                 sum -= D[i][c] * D[c][c] * D[j][c];
             }
@@ -247,7 +286,7 @@ fn eliminate_hinge(body: &Body, map: &[Vector6<f64>; MAX_RATES], own: &mut BodyI
             return Err((i, D[i][i], scale));
         }
     }
-    if matches!(body.hinge.kind, HingeKind::Free) {
+    if matches!(body.hinge.kind, HingeKind::Free) && added.is_none() {
         // nothing passes a free hinge: exactly zero instead of rounding
         own.P_plus = SpatialInertia::default();
     } else {

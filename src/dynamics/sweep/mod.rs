@@ -4,4 +4,5 @@ pub mod acceleration_outward;
 pub mod force_inward;
 pub mod inertia_inward;
 pub mod pose_outward;
+pub mod response;
 pub mod velocity_outward;

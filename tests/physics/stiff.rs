@@ -1,0 +1,231 @@
+//! The linearly implicit method: its order, and stiff modes that cost neither steps nor time.
+
+use crate::support::lumped::lumped_body;
+use crate::support::scenes::{Z, difference, dormand_prince, exact_beam, flexible, hinge, numbers, rigid, run, slopes};
+use crate::support::trees::{Recipe, random_tree};
+use nalgebra::{Matrix3, Vector3};
+use pliant::dynamics::{Workspace, forward_dynamics};
+use pliant::integrate::chart::Chart;
+use pliant::integrate::choice::choose;
+use pliant::integrate::simulate::Method;
+use pliant::integrate::step_control::Tolerance;
+use pliant::integrate::w_tableau::ROS34PW2;
+use pliant::integrate::{Outcome, RosenbrockW, Settings, Stepper, simulate};
+use pliant::model::build::{BodyDefinitionKind, Definition, WORLD};
+use pliant::model::modal_body::Boundary;
+use pliant::model::{InertiaOrder, State, System, TimeFunction};
+use rand::SeedableRng;
+use rand::rngs::StdRng;
+use std::f64::consts::TAU;
+use std::time::Instant;
+
+const fn rosenbrock_w(tolerance: f64) -> Method {
+    Method::RosenbrockW { tolerance: Tolerance { relative: tolerance, absolute: tolerance }, largest_step: f64::INFINITY }
+}
+
+/// A tolerance that nothing exceeds: steps of one length after a short start.
+const LOOSE: Tolerance = Tolerance { relative: 1e6, absolute: 1e6 };
+const fn fixed(step: f64) -> Method {
+    Method::RosenbrockW { tolerance: LOOSE, largest_step: step }
+}
+
+/// Root mean square, over ten times, of the errors against the explicit pair at steps (s) whose own error is below rounding.
+fn errors(system: &System, start: &State, methods: &[Method], reference: f64, duration: f64) -> Vec<f64> {
+    let samples = |method: Method| {
+        let mut seen = Vec::new();
+        run(system, start, method, duration, 10.0 / duration, |s| seen.push(numbers(s.state)));
+        seen
+    };
+    let exact = samples(Method::DormandPrince { tolerance: LOOSE, largest_step: reference });
+    let error = |m: &Method| samples(*m).iter().zip(&exact).map(|(s, e)| difference(s, e).powi(2)).sum::<f64>().sqrt();
+    methods.iter().map(error).collect()
+}
+
+#[test]
+fn order_is_3_on_every_sort_of_tree() {
+    let all = Recipe { bodies: 4, flexible: 1.0, ..Recipe::default() };
+    let recipes = [
+        Recipe { flexible: 0.0, ..all },
+        Recipe { boundary: Some(Boundary::Cantilever), ..all },
+        Recipe { boundary: Some(Boundary::FreeFree), ..all },
+        Recipe { boundary: Some(Boundary::General), ..all },
+        Recipe { prescribed: 0.6, bodies: 6, flexible: 0.5, ..all },
+        Recipe { base: Some("free"), ..all },
+        Recipe { base: Some("spherical"), flexible: 0.5, ..all },
+    ];
+    for (r, recipe) in recipes.iter().enumerate() {
+        let mut seen = 0;
+        for seed in 0..5 {
+            let (system, mut start) = random_tree(seed + 50 * r as u64, recipe).build().unwrap();
+            start.apply_prescribed(&system);
+            // within what random modes bear
+            start.modal_position.iter_mut().chain(&mut start.modal_velocity).for_each(|x| *x *= 0.3);
+            // a random mode may yet be carried to where its body has an inertia that no body has
+            let settings = Settings { duration: 0.1, method: Method::DormandPrince { tolerance: LOOSE, largest_step: 1e-4 }, rate_hz: 1.0 };
+            if simulate(&system, &start, &settings, &mut []).outcome != Outcome::Completed {
+                continue;
+            }
+            seen += 1;
+            let steps: Vec<_> = (0..4).map(|i| fixed(0.002 * 0.5_f64.powi(i))).collect();
+            let errors = errors(&system, &start, &steps, 1e-4, 0.1);
+            println!("recipe {r} seed {seed}: {errors:?}, orders {:.2?}", slopes(&errors));
+            assert!(slopes(&errors).iter().all(|s| (s - 3.0).abs() < 0.2), "recipe {r} seed {seed}: orders {:?}", slopes(&errors));
+        }
+        assert!(seen >= 3, "recipe {r}: {seen} trees ran");
+    }
+}
+
+/// Hub on a driven hinge, sprung panel of four modes, tip mass; the last mode has `fastest_hz`.
+fn panel(fastest_hz: f64) -> (System, State) {
+    let mut modal = lumped_body(&mut StdRng::seed_from_u64(11), Boundary::Cantilever, 4).modal;
+    modal.frequency_hz = vec![0.3, 0.7, 1.6, fastest_hz];
+    let mut panel = flexible("panel", modal);
+    if let BodyDefinitionKind::Flexible(f) = &mut panel.kind {
+        f.damping_ratio = vec![0.005; 4];
+    }
+    let mut base = hinge("base", "revolute", &[Z], WORLD, "hub", [0.0; 3]);
+    base.torque = Some(TimeFunction::Sine { amplitude: vec![20.0], frequency_hz: 0.1, phase: 0.4 });
+    let mut root = hinge("root", "revolute", &[[0.0, 1.0, 0.2]], "hub", "panel", [0.5, 0.1, 0.0]);
+    (root.position, root.stiffness, root.damping) = (vec![0.3], vec![40.0], vec![0.5]);
+    let mut tip = hinge("tip", "fixed", &[], "panel", "mass", [0.0; 3]);
+    tip.parent_node = Some("tip".into());
+    let bodies = vec![rigid("hub", 50.0, [0.0; 3], [30.0; 3]), panel, rigid("mass", 2.0, [0.1, 0.0, 0.0], [0.1; 3])];
+    Definition { gravity: Vector3::zeros(), bodies, hinges: vec![base, root, tip], loads: vec![] }.build().unwrap()
+}
+
+#[test]
+fn steps_and_time_per_step_do_not_grow_with_the_fastest_mode() {
+    for tolerance in [1e-3, 1e-4] {
+        let run_with = |hz: f64| {
+            let (system, start) = panel(hz);
+            let mut least = f64::INFINITY;
+            let mut steps = 0;
+            // the best of several is the one that other processes disturbed least
+            for _ in 0..10 {
+                let begin = Instant::now();
+                let summary = run(&system, &start, rosenbrock_w(tolerance), 10.0, 1.0, |_| {});
+                steps = summary.steps + summary.rejected;
+                least = least.min(begin.elapsed().as_secs_f64() / steps as f64);
+            }
+            println!("{tolerance:e}, {hz} Hz: {steps} steps, {:.1} us per step", least * 1e6);
+            (steps as f64, least)
+        };
+        let slow = run_with(3.0);
+        for hz in [30.0, 3e3, 3e5] {
+            let stiff = run_with(hz);
+            assert!(stiff.0 <= 1.1 * slow.0, "{tolerance:e}, {hz} Hz: {} steps, {} at 3 Hz", stiff.0, slow.0);
+            assert!(stiff.1 <= 1.5 * slow.1, "{tolerance:e}, {hz} Hz: {:e} s per step, {:e} at 3 Hz", stiff.1, slow.1);
+        }
+    }
+}
+
+#[test]
+fn both_methods_agree_at_tight_tolerances() {
+    let (system, start) = panel(3.0);
+    let end = |method| numbers(&run(&system, &start, method, 2.0, 1.0, |_| {}).end);
+    let (implicit, explicit) = (end(rosenbrock_w(1e-8)), end(dormand_prince(1e-12)));
+    println!("difference {:e}", difference(&implicit, &explicit));
+    // global errors of a method of order 3 go as tolerance^(2/3..1)
+    assert!(difference(&implicit, &explicit) < 1e-6, "{:e}", difference(&implicit, &explicit));
+}
+
+#[test]
+fn a_stage_costs_less_than_two_evaluations() {
+    let definition = random_tree(5, &Recipe { bodies: 30, flexible: 0.7, ..Recipe::default() });
+    let (system, start) = definition.build().unwrap();
+    let least = |mut once: Box<dyn FnMut() + '_>| {
+        let time = || {
+            let begin = Instant::now();
+            once();
+            begin.elapsed().as_secs_f64()
+        };
+        std::iter::repeat_with(time).take(200).fold(f64::INFINITY, f64::min)
+    };
+    let mut workspace = Workspace::new(&system);
+    let evaluation = least(Box::new(|| forward_dynamics(&system, &start, &mut workspace).unwrap()));
+    let mut chart = Chart::new(&system, &start);
+    let mut stepper = RosenbrockW::new(ROS34PW2, LOOSE, &chart);
+    stepper.restart(&mut chart).unwrap();
+    let step = least(Box::new(|| {
+        stepper.attempt(&mut chart, 1e-4).unwrap();
+    }));
+    let ratio = step / 4.0 / evaluation;
+    println!("evaluation {:.1} us, stage {ratio:.2} of it", evaluation * 1e6);
+    assert!(ratio <= 2.2, "{ratio}");
+}
+
+/// One body (J = 1 about its hinge) with modes of the given frequencies, each coupled to the hinge by `coupling`; linear.
+fn coupled(frequency_hz: Vec<f64>, coupling: f64, damping_ratio: f64) -> (System, State) {
+    let n = frequency_hz.len();
+    let mut modal = exact_beam(n);
+    let about_z = Matrix3::from_fn(|i, j| if (i, j) == (0, 1) { coupling } else { 0.0 });
+    modal.center_of_mass = Vector3::zeros();
+    modal.inertia = Matrix3::identity();
+    (modal.momentum, modal.first_moment) = (vec![Vector3::zeros(); n], vec![about_z; n]);
+    (modal.frequency_hz, modal.damping_ratio) = (frequency_hz, vec![damping_ratio; n]);
+    let mut body = flexible("body", modal);
+    if let BodyDefinitionKind::Flexible(f) = &mut body.kind {
+        f.order = InertiaOrder::Zeroth;
+    }
+    let mut base = hinge("base", "revolute", &[Z], WORLD, "body", [0.0; 3]);
+    base.torque = Some(TimeFunction::Constant(vec![1.0]));
+    Definition { gravity: Vector3::zeros(), bodies: vec![body], hinges: vec![base], loads: vec![] }.build().unwrap()
+}
+
+/// S10: closed form; ten modes, each displaced by the same elastic force, so that theta'' = (1 + 0.01 delta) / J_eff.
+#[test]
+fn modes_from_1e_minus_3_to_1e6_hz_in_one_body_cost_only_the_digits_of_what_inertia_is_left() {
+    for (coupling, inertia, expected) in [(0.3, 0.1, 10.03), (0.316_227_607_902_915_4, 1e-6, 1_003_162.276_079_029_2)] {
+        let frequencies: Vec<f64> = (0..10).map(|i| 10.0_f64.powi(i - 3)).collect();
+        let (system, mut state) = coupled(frequencies.clone(), coupling, 0.0);
+        state.modal_position = frequencies.iter().map(|f| 1e-3 / (TAU * f).powi(2)).collect();
+        let mut workspace = Workspace::new(&system);
+        forward_dynamics(&system, &state, &mut workspace).unwrap();
+        let off = (workspace.acceleration.hinge[0] / expected - 1.0).abs();
+        println!("J_eff {inertia:e}: off by {:.2} eps / J_eff", off / f64::EPSILON * inertia);
+        assert!(off <= 4.0 * f64::EPSILON / inertia, "J_eff {inertia:e}: {off:e}");
+    }
+}
+
+/// S11: a pulse of one second on modes from 1e-3 to 1e5 Hz; matrix exponential in high precision. RK4 would need 2.3e6 steps.
+#[test]
+fn a_stiff_transient_is_met_to_1e_minus_6_in_less_than_2e4_steps() {
+    let (mut system, start) = coupled([1e-3, 1e-1, 1e1, 1e3, 1e5].to_vec(), 0.05_f64.sqrt(), 0.005);
+    let method = rosenbrock_w(1e-6);
+    let pulse = run(&system, &start, method, 1.0, 1.0, |_| {});
+    system.bodies[0].hinge.torque = None;
+    let rest = run(&system, &pulse.end, method, 9.0, 1.0, |_| {});
+    let steps = pulse.steps + pulse.rejected + rest.steps + rest.rejected;
+    let off = (rest.end.position[0] / 9.986_558_575_223_236 - 1.0).abs();
+    println!("{steps} steps, theta off by {off:e}");
+    assert!(off < 1e-6 && steps < 20_000, "{steps} steps, {off:e}");
+}
+
+#[test]
+fn energy_of_a_mode_that_is_not_resolved_only_falls() {
+    let (mut system, mut start) = coupled([0.1, 1e4].to_vec(), 0.3, 0.0);
+    system.bodies[0].hinge.torque = None;
+    let omega: Vec<f64> = [0.1, 1e4].iter().map(|f| TAU * f).collect();
+    start.modal_position = vec![1.0 / omega[0], 1.0 / omega[1]];
+    let mut energies = Vec::new();
+    run(&system, &start, rosenbrock_w(1e-4), 20.0, 10.0, |s| {
+        let (v, e) = (s.state.velocity[0], &s.state.modal_velocity);
+        let elastic: f64 = omega.iter().zip(&s.state.modal_position).map(|(w, x)| 0.5 * (w * x).powi(2)).sum();
+        energies.push(0.5 * (v * v + e[0] * e[0] + e[1] * e[1]) + 0.3 * v * (e[0] + e[1]) + elastic);
+    });
+    println!("energy {:?}", energies.iter().step_by(20).collect::<Vec<_>>());
+    // half of the energy is in the mode of 1e4 Hz: followed while it is large, damped by then; the slow mode, which is resolved, loses
+    // 0.2 % in two periods at this tolerance
+    assert!(energies.windows(2).all(|e| e[1] <= e[0] * (1.0 + 1e-5)));
+    assert!((energies[0] - 1.0).abs() < 1e-12 && energies[20] < 0.501 && energies[200] > 0.498);
+}
+
+#[test]
+fn auto_takes_the_implicit_method_once_the_fastest_mode_costs_the_explicit_one_steps() {
+    let tolerance = Tolerance { relative: 1e-4, absolute: 1e-4 };
+    for (hz, name) in [(2.0, "dormand_prince"), (30.0, "rosenbrock_w"), (3e5, "rosenbrock_w")] {
+        let choice = choose(&panel(hz).0, tolerance, f64::INFINITY, 10.0);
+        println!("{}", choice.reason);
+        assert!(choice.method.name() == name && choice.reason.starts_with(name) && choice.reason.contains("mode 4 of \"panel\""));
+    }
+}
