@@ -54,7 +54,7 @@ pub struct ModesArguments {
 #[derive(Debug, Args)]
 #[command(help_expected = true)]
 pub struct SceneArguments {
-    /// Integrate with this method instead of the scene's: auto, dormand_prince or rk4
+    /// Integrate with this method instead of the scene's: auto, dormand_prince, rosenbrock_w or rk4
     #[arg(long, value_name = "NAME")]
     pub integrator: Option<String>,
     /// Retain the lowest N modes of every flexible body

@@ -189,18 +189,16 @@ fn announce(scene: &Scene, settings: &Settings, left_out: &[String]) {
     )];
     if let Some(mode) = fastest_mode(system) {
         let stable = settings.method.stable_step(mode.frequency_hz, mode.damping_ratio);
-        lines.push(format!(
-            "fastest retained mode: mode {} of \"{}\" at {} Hz; stable step {} s",
-            mode.mode,
-            mode.body,
-            number(mode.frequency_hz),
-            number(stable)
-        ));
+        let limit = if stable.is_finite() { format!("stable step {} s", number(stable)) } else { "stable at any step".to_owned() };
+        lines.push(format!("fastest retained mode: mode {} of \"{}\" at {} Hz; {limit}", mode.mode, mode.body, number(mode.frequency_hz)));
         if let Method::RungeKutta4 { step } = settings.method
             && step > stable
         {
             lines.push(format!("warning: the step of {} s is larger than that; the run will leave finite numbers", number(step)));
         }
+    }
+    if let Some(reason) = &scene.method_reason {
+        lines.push(format!("integrator chosen: {reason}"));
     }
     lines.push(format!("left out: {}", left_out.join(", ")));
     let mut sink = std::io::stderr().lock();

@@ -60,6 +60,8 @@ pub struct Scene {
     pub state: State,
     /// Integration method.
     pub method: Method,
+    /// Why this method, where the scene leaves the choice to pliant.
+    pub method_reason: Option<String>,
     /// Simulated time (s), if the scene gives one.
     pub duration: Option<f64>,
     /// Output times per second.
@@ -122,7 +124,8 @@ pub fn assemble(source: Source, overrides: &Overrides) -> Result<Scene, SceneErr
     if let Some(duration) = duration.filter(|d| !(*d > 0.0 && d.is_finite())) {
         return Err(source.value(&[Step::Key("simulation"), Step::Key("duration")], format!("{duration} s must be positive")));
     }
-    let method = settings::method(&spec.simulation, overrides.integrator.as_deref(), &system, spec.output.rate_hz, &source)?;
+    let (method, method_reason) =
+        settings::method(&spec.simulation, overrides.integrator.as_deref(), &system, spec.output.rate_hz, &source)?;
     let hinges = match &spec.output.hinges {
         None => system.definition_order.clone(),
         Some(names) => names_to_indices(names, "hinges", "hinge", |n| system.hinge_index(n), &source)?,
@@ -146,6 +149,7 @@ pub fn assemble(source: Source, overrides: &Overrides) -> Result<Scene, SceneErr
         system,
         state,
         method,
+        method_reason,
         duration,
         rate_hz: spec.output.rate_hz,
         hinges,

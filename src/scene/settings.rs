@@ -24,11 +24,17 @@ pub const INTEGRATORS: [(&str, &str); 4] = [
 /// Share of the stable step that a fixed step takes when the scene gives none.
 const DEFAULT_SHARE: f64 = 0.25;
 
-/// The method that a scene asks for.
+/// The method that a scene asks for, and why where pliant chose.
 ///
 /// # Errors
 /// If the name is unknown, or a step or tolerance cannot be.
-pub fn method(spec: &SimulationSpec, name: Option<&str>, system: &System, rate_hz: f64, source: &Source) -> Result<Method, SceneError> {
+pub fn method(
+    spec: &SimulationSpec,
+    name: Option<&str>,
+    system: &System,
+    rate_hz: f64,
+    source: &Source,
+) -> Result<(Method, Option<String>), SceneError> {
     let at = |key| [Step::Key("simulation"), Step::Key(key)];
     for (key, value) in [("step", spec.step), ("largest_step", spec.largest_step)] {
         if let Some(value) = value.filter(|v| !(*v > 0.0)) {
@@ -43,13 +49,16 @@ pub fn method(spec: &SimulationSpec, name: Option<&str>, system: &System, rate_h
     let tolerance = Tolerance { relative: spec.relative_tolerance, absolute: spec.absolute_tolerance };
     let largest_step = spec.largest_step.unwrap_or(f64::INFINITY);
     match name.or(spec.integrator.as_deref()).unwrap_or("auto") {
-        "auto" => Ok(choose(system, tolerance, largest_step, rate_hz).method),
-        "dormand_prince" => Ok(Method::DormandPrince { tolerance, largest_step }),
-        "rosenbrock_w" => Ok(Method::RosenbrockW { tolerance, largest_step }),
+        "auto" => {
+            let choice = choose(system, tolerance, largest_step, rate_hz);
+            Ok((choice.method, Some(choice.reason)))
+        }
+        "dormand_prince" => Ok((Method::DormandPrince { tolerance, largest_step }, None)),
+        "rosenbrock_w" => Ok((Method::RosenbrockW { tolerance, largest_step }, None)),
         "rk4" => {
             let stable = fastest_mode(system).map(|m| stable_step(&tableau::RK4, m.frequency_hz, m.damping_ratio));
             let step = spec.step.unwrap_or_else(|| stable.map_or(f64::INFINITY, |h| DEFAULT_SHARE * h).min(1.0 / rate_hz));
-            Ok(Method::RungeKutta4 { step })
+            Ok((Method::RungeKutta4 { step }, None))
         }
         other => {
             let known = INTEGRATORS.map(|i| i.0).join(", ");
