@@ -3,6 +3,7 @@
 use super::args::{EvalArguments, SceneArguments};
 use super::failure::Failure;
 use super::report::{Align, Table, number};
+use crate::dynamics::closed_chain::assembly;
 use crate::output::Evaluation;
 use crate::scene::{Overrides, assemble};
 use std::io::Write;
@@ -14,6 +15,7 @@ impl From<&SceneArguments> for Overrides {
             modes: arguments.modes,
             rigid: arguments.rigid.clone(),
             duration: None,
+            closure_method: arguments.closure_method.clone(),
         }
     }
 }
@@ -27,6 +29,7 @@ pub fn run(arguments: &EvalArguments, output: &mut dyn Write) -> Result<(), Fail
     let mut state = scene.state.clone();
     state.time = arguments.time;
     state.apply_prescribed(&scene.system);
+    assembly::assemble(&scene.system, &mut state).map_err(|e| Failure::input(e.to_string()))?;
     let evaluation = Evaluation::of(&scene.system, &state)?;
     if arguments.json {
         let text = serde_json::to_string_pretty(&evaluation).map_err(|e| Failure::Output(e.into()))?;

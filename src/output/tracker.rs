@@ -6,7 +6,7 @@ use super::plan::OutputPlan;
 use super::report::{BodyPeak, ErrorFigures, Exceedance, HingePeak, Peaks};
 use crate::dynamics::energy::Momentum;
 use crate::integrate::Sample;
-use crate::model::{HingeKind, System};
+use crate::model::{ClosureJoint, HingeKind, System};
 use crate::spatial::shift::{angular, linear};
 
 /// Something an output time made known.
@@ -81,6 +81,7 @@ pub struct Tracker {
     angular_drift: f64,
     span: f64,
     audit: Option<f64>,
+    closure: Option<f64>,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -128,6 +129,7 @@ impl Tracker {
             angular_drift: 0.0,
             span: 0.0,
             audit: None,
+            closure: None,
         }
     }
 
@@ -155,6 +157,9 @@ impl Tracker {
         self.follow_balances(sample, frame);
         if let Some(audit) = frame.audit {
             self.audit = Some(self.audit.unwrap_or(0.0).max(audit.load));
+        }
+        if let Some(closure) = frame.closure {
+            self.closure = Some(self.closure.unwrap_or(0.0).max(closure));
         }
     }
 
@@ -219,7 +224,7 @@ impl Tracker {
             energy: ratio(self.energy_error, scale),
             momentum: self.isolated.then(|| self.momentum_error()),
             audit: self.audit,
-            closure: None,
+            closure: self.closure,
             local,
         }
     }
@@ -246,5 +251,6 @@ fn is_isolated(system: &System) -> bool {
             && hinge.torque.is_none()
             && hinge.motion.is_none()
     });
-    floats && system.gravity.norm() == 0.0 && system.loads.is_empty()
+    let anchored = system.closures.iter().any(|c| matches!(&c.joint, ClosureJoint::Frames { a, b, .. } if a.body.is_none() || b.body.is_none()));
+    floats && !anchored && system.gravity.norm() == 0.0 && system.loads.is_empty()
 }
