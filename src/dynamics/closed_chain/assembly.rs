@@ -56,7 +56,7 @@ pub fn assemble(system: &System, state: &mut State) -> Result<Assembled, Assembl
     let mut workspace = Workspace::new(system);
     let mut done = Assembled::default();
     let mut drift = measure(system, state, &mut workspace);
-    if !(drift.position <= FITS) {
+    if drift.position > FITS {
         done.positions = true;
         for modes in [false, true] {
             if drift.position > FITS && (!modes || system.modal_count > 0) {
@@ -64,7 +64,7 @@ pub fn assemble(system: &System, state: &mut State) -> Result<Assembled, Assembl
                 drift = measure(system, state, &mut workspace);
             }
         }
-        if !(drift.position <= FITS) {
+        if drift.position > FITS {
             return Err(refusal(system, state, &workspace, true));
         }
     }
@@ -77,7 +77,7 @@ pub fn assemble(system: &System, state: &mut State) -> Result<Assembled, Assembl
                 drift = measure(system, state, &mut workspace);
             }
         }
-        if !(drift.rate <= FITS * speed) {
+        if drift.rate > FITS * speed {
             return Err(refusal(system, state, &workspace, false));
         }
     }
@@ -185,7 +185,7 @@ fn close_positions(system: &System, state: &mut State, workspace: &mut Workspace
     let mut damping = 0.0;
     let mut size = violations(system, state, workspace, true).norm();
     for _ in 0..LARGEST_COUNT {
-        if !(size > CLOSED) {
+        if size <= CLOSED {
             return;
         }
         let found = violations(system, state, workspace, true);

@@ -26,8 +26,9 @@ pub struct Drift {
     pub moved: bool,
 }
 
+/// Largest magnitude; infinite if one is not a number.
 fn largest(x: &[f64]) -> f64 {
-    x.iter().fold(0.0, |m, x| x.abs().max(m))
+    x.iter().fold(0.0, |m, x| if x.is_nan() { f64::INFINITY } else { x.abs().max(m) })
 }
 
 /// Largest violations at `state`, which is left as it is; `workspace` holds its poses and velocities afterwards.
@@ -57,7 +58,7 @@ pub fn project(system: &System, state: &mut State, workspace: &mut Workspace) ->
     }
     let mut moved = false;
     for _ in 0..LARGEST_COUNT {
-        if !(drift.position > CLOSED) {
+        if drift.position <= CLOSED {
             break;
         }
         let before = (drift.position, state.clone());
@@ -65,7 +66,7 @@ pub fn project(system: &System, state: &mut State, workspace: &mut Workspace) ->
             break;
         }
         drift = measure(system, state, workspace);
-        if !(drift.position < before.0) {
+        if drift.position >= before.0 {
             // rounding, or a direction that is left alone
             *state = before.1;
             drift = measure(system, state, workspace);

@@ -106,7 +106,7 @@ impl Schur {
         // ascending
         // loops that cannot move at all leave rounding as the largest
         let limit = threshold * self.values.last().copied().unwrap_or(0.0).max(1e-6);
-        self.null_count = self.values.iter().filter(|v| !(**v > limit)).count();
+        self.null_count = self.values.iter().filter(|v| **v <= limit).count();
         self.orthonormalise();
         Ok(())
     }
@@ -133,6 +133,12 @@ impl Schur {
                 }
             }
         }
+    }
+
+    /// True if some motion answers the multiplier `row`.
+    #[must_use]
+    pub fn responds(&self, row: usize) -> bool {
+        self.bound[row] > 0.0
     }
 
     /// Largest factor by which a row is scaled.

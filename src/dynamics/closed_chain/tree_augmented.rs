@@ -42,11 +42,12 @@ impl ClosedChain {
             }
         }
         let (missed, size) = self.schur.solve(&right, &mut self.lambda);
+        let rigid = (0..right.len()).filter(|&row| !self.schur.responds(row)).fold(0.0_f64, |m, row| m.max(right[row].abs()));
         self.right = right;
         // a right-hand side of rounding has no direction: it is measured against the accelerations it is the difference of
         let felt = self.support.iter().map(|&k| acceleration.alpha[k].amax()).fold(sizes, f64::max);
         let scale = self.schur.largest_scale();
-        if missed > CONTRADICTION * size && missed > 1e-9 * felt * scale {
+        if (missed > CONTRADICTION * size && missed > 1e-9 * felt * scale) || rigid > 1e-9 * felt {
             return Err(self.contradiction(system));
         }
 
