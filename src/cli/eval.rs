@@ -64,6 +64,14 @@ fn write_tables(evaluation: &Evaluation, output: &mut dyn Write) -> Result<(), F
         let list = |x: &[f64]| x.iter().map(|x| number(*x)).collect::<Vec<_>>().join(" ");
         writeln!(output, "modal accelerations of {name}: {}", list(&body.modal_acceleration))?;
     }
+    for (name, closure) in evaluation.closures.iter() {
+        let list = |x: &[f64; 3]| x.map(number).join(" ");
+        let load = match closure.coordinate_force {
+            Some(force) => format!("{} on coordinate b", number(force)),
+            None => format!("moment {} N m, force {} N on b at b's point, in a's axes", list(&closure.load.moment), list(&closure.load.force)),
+        };
+        writeln!(output, "closure {name}: {load}; open by {:.1e}", closure.residual)?;
+    }
     let energy = &evaluation.energy;
     writeln!(
         output,

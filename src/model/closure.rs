@@ -78,6 +78,7 @@ pub struct HingeCoordinate {
 
 /// What is joined, and how.
 #[derive(Debug, Clone)]
+#[expect(clippy::large_enum_variant, reason = "one per closure, built once")]
 pub enum ClosureJoint {
     /// A joint between two frames.
     Frames {
