@@ -12,6 +12,7 @@ use pliant::integrate::{RosenbrockW, Stepper};
 use pliant::model::modal_body::Boundary;
 use std::alloc::{GlobalAlloc, Layout, System as SystemAllocator};
 use std::cell::Cell;
+use support::loops::random_loops;
 use support::trees::{KINDS, Recipe, random_tree};
 
 thread_local! {
@@ -89,6 +90,20 @@ fn steps_of_the_linearly_implicit_method_allocate_nothing() {
         step();
         // a move of the base to the next chart keeps its vectors
         let allocations = count(|| (0..3).for_each(|_| step()));
+        assert_eq!(allocations, 0, "seed {seed}");
+    }
+}
+
+#[test]
+fn evaluations_with_closures_allocate_nothing() {
+    for seed in 0..20 {
+        let (system, state) = random_loops(seed, &Recipe { bodies: 12, ..Recipe::default() }, 2).build().unwrap();
+        let mut workspace = Workspace::new(&system);
+        // closures that contradict one another are refused, and by a message that allocates
+        if forward_dynamics(&system, &state, &mut workspace).is_err() {
+            continue;
+        }
+        let allocations = count(|| (0..3).for_each(|_| forward_dynamics(&system, &state, &mut workspace).unwrap()));
         assert_eq!(allocations, 0, "seed {seed}");
     }
 }

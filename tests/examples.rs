@@ -6,6 +6,7 @@ use pliant::dynamics::energy::balance;
 use pliant::dynamics::hinge_load::hinge_load;
 use pliant::dynamics::world::{WorldFrame, world_frames};
 use pliant::integrate::{Flow, Observer, Outcome, Sample, Settings, simulate};
+use pliant::output::Evaluation;
 use pliant::scene::{Overrides, Scene, assemble};
 use std::path::Path;
 
@@ -123,4 +124,18 @@ fn free_free_and_cantilever_modes_give_the_same_root_loads() {
         }
     }
     assert!(difference < 1e-3 * size, "{:e} of {size}", difference / size);
+}
+
+#[test]
+fn four_bar_starts_with_the_accelerations_of_the_closed_solution_and_stays_closed() {
+    let scene = example("06_four_bar/scene.toml");
+    let evaluation = Evaluation::of(&scene.system, &scene.state).unwrap();
+    // angular accelerations of crank, coupler and rocker, solved with 30 digits (reference problem C09)
+    let rate = |name: &str| evaluation.hinges.get(name).unwrap().acceleration[0];
+    let found = [rate("crank_foot"), rate("crank_foot") + rate("crank_pin"), rate("rocker_foot")];
+    for (f, e) in found.iter().zip([-9.856_158_991_543_052, 2.990_203_058_289_293, 0.062_798_651_029_610_68]) {
+        assert!((f - e).abs() < 1e-11, "{found:?}");
+    }
+    let end = run(&scene);
+    assert!(end.position.iter().all(|x| x.is_finite()));
 }

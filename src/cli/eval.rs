@@ -3,13 +3,20 @@
 use super::args::{EvalArguments, SceneArguments};
 use super::failure::Failure;
 use super::report::{Align, Table, number};
+use crate::dynamics::closed_chain::assembly;
 use crate::output::Evaluation;
 use crate::scene::{Overrides, assemble};
 use std::io::Write;
 
 impl From<&SceneArguments> for Overrides {
     fn from(arguments: &SceneArguments) -> Self {
-        Self { integrator: arguments.integrator.clone(), modes: arguments.modes, rigid: arguments.rigid.clone(), duration: None }
+        Self {
+            integrator: arguments.integrator.clone(),
+            modes: arguments.modes,
+            rigid: arguments.rigid.clone(),
+            duration: None,
+            closure_method: arguments.closure_method.clone(),
+        }
     }
 }
 
@@ -22,6 +29,7 @@ pub fn run(arguments: &EvalArguments, output: &mut dyn Write) -> Result<(), Fail
     let mut state = scene.state.clone();
     state.time = arguments.time;
     state.apply_prescribed(&scene.system);
+    assembly::assemble(&scene.system, &mut state).map_err(|e| Failure::input(e.to_string()))?;
     let evaluation = Evaluation::of(&scene.system, &state)?;
     if arguments.json {
         let text = serde_json::to_string_pretty(&evaluation).map_err(|e| Failure::Output(e.into()))?;
@@ -55,6 +63,16 @@ fn write_tables(evaluation: &Evaluation, output: &mut dyn Write) -> Result<(), F
     for (name, body) in evaluation.bodies.iter() {
         let list = |x: &[f64]| x.iter().map(|x| number(*x)).collect::<Vec<_>>().join(" ");
         writeln!(output, "modal accelerations of {name}: {}", list(&body.modal_acceleration))?;
+    }
+    for (name, closure) in evaluation.closures.iter() {
+        let list = |x: &[f64; 3]| x.map(number).join(" ");
+        let load = match closure.coordinate_force {
+            Some(force) => format!("{} on coordinate b", number(force)),
+            None => {
+                format!("moment {} N m, force {} N on b at b's point, in a's axes", list(&closure.load.moment), list(&closure.load.force))
+            }
+        };
+        writeln!(output, "closure {name}: {load}; open by {:.1e}", closure.residual)?;
     }
     let energy = &evaluation.energy;
     writeln!(

@@ -4,6 +4,8 @@
 //! acceleration; the recursion's articulated quantities are not used. For tests, audits and small systems.
 
 use super::Workspace;
+use super::closed_chain::constraint::Motion;
+use super::closed_chain::least_norm::least_norm;
 use super::inverse::NewtonEuler;
 use super::sweep::{force_inward, pose_outward, velocity_outward};
 use crate::model::{BodyKind, State, System};
@@ -22,6 +24,10 @@ pub struct DenseEquations {
     pub free: Vec<usize>,
     /// Accelerations of all coordinates with the free ones zero.
     pub prescribed: DVector<f64>,
+    /// G: motion along the closures' blocked directions per rate.
+    pub closure_map: DMatrix<f64>,
+    /// Acceleration along them with every free acceleration zero.
+    pub closure_bias: DVector<f64>,
 }
 
 /// Assembles the equations at `state`.
@@ -35,6 +41,10 @@ pub fn equations(system: &System, state: &State) -> DenseEquations {
     // body velocities per unit rate
     let mut unit = state.clone();
     let mut columns = Vec::with_capacity(n);
+    let mut closure_map = DMatrix::zeros(system.closure_rows(), n);
+    if let Some(chain) = &mut workspace.closed {
+        chain.follow_pose(system, state, &workspace.pose);
+    }
     for i in 0..n {
         unit.velocity.fill(0.0);
         unit.modal_velocity.fill(0.0);
@@ -44,6 +54,9 @@ pub fn equations(system: &System, state: &State) -> DenseEquations {
             unit.modal_velocity[i - nv] = 1.0
         }
         velocity_outward::velocity_outward(system, &unit, &workspace.pose, &mut workspace.velocity);
+        if let Some(chain) = &workspace.closed {
+            chain.rates(system, &unit, &workspace.velocity, closure_map.column_mut(i).as_mut_slice());
+        }
         columns.push(workspace.velocity.bodies.iter().map(|b| b.V).collect::<Vec<_>>());
     }
     let mut mass = DMatrix::zeros(n, n);
@@ -86,6 +99,7 @@ pub fn equations(system: &System, state: &State) -> DenseEquations {
     }
     let mut sweep = NewtonEuler::new(system);
     sweep.sweep(system, state, &prescribed.as_slice()[..nv], &vec![0.0; nm], &workspace.pose, &workspace.force);
+    let closure_bias = closure_bias(system, state, &mut workspace, &sweep, &prescribed.as_slice()[..nv]);
     let (mut hinge, mut modal) = (vec![0.0; nv], vec![0.0; nm]);
     sweep.generalised_force(system, state, &workspace.pose, &mut hinge, &mut modal);
     let mut force = DVector::zeros(n);
@@ -95,10 +109,55 @@ pub fn equations(system: &System, state: &State) -> DenseEquations {
     for m in 0..nm {
         force[nv + m] = -modal[m];
     }
-    DenseEquations { mass, force, free: (0..n).filter(|&i| is_free[i]).collect(), prescribed }
+    DenseEquations { mass, force, free: (0..n).filter(|&i| is_free[i]).collect(), prescribed, closure_map, closure_bias }
+}
+
+/// Accelerations along the blocked directions by the independent sweep.
+fn closure_bias(system: &System, state: &State, workspace: &mut Workspace, sweep: &NewtonEuler, hinge: &[f64]) -> DVector<f64> {
+    let mut out = DVector::zeros(system.closure_rows());
+    let modal = vec![0.0; system.modal_count];
+    let motion =
+        Motion { body: |k: usize| sweep.body_acceleration(k), world: force_inward::world_acceleration(system), hinge, modal: &modal };
+    if let Some(chain) = &mut workspace.closed {
+        chain.follow_rates(system, state, &workspace.velocity);
+        for (closure, at) in system.closures.iter().zip(&chain.closures) {
+            at.along(closure, system, &motion, &mut out.as_mut_slice()[closure.rows()]);
+            for (o, b) in out.as_mut_slice()[closure.rows()].iter_mut().zip(&at.bias) {
+                *o += b;
+            }
+        }
+    }
+    out
 }
 
 impl DenseEquations {
+    /// Accelerations of all coordinates and multipliers of the closures, by one dense system `[M G'; G 0]` and its singular values:
+    /// where the multipliers are not unique, those of least norm. None if the decomposition fails.
+    #[must_use]
+    pub fn closed_accelerations(&self) -> Option<(DVector<f64>, DVector<f64>)> {
+        let (n, rows) = (self.free.len(), self.closure_bias.len());
+        let (mut matrix, mut right) = (DMatrix::zeros(n + rows, n + rows), DVector::zeros(n + rows));
+        for (i, &m) in self.free.iter().enumerate() {
+            for (j, &l) in self.free.iter().enumerate() {
+                matrix[(i, j)] = self.mass[(m, l)];
+            }
+            right[i] = self.force[m];
+            for row in 0..rows {
+                matrix[(i, n + row)] = -self.closure_map[(row, m)];
+                matrix[(n + row, i)] = self.closure_map[(row, m)];
+            }
+        }
+        for row in 0..rows {
+            right[n + row] = -self.closure_bias[row];
+        }
+        let solved = least_norm(&matrix, &right, 1e-11, 0.0)?;
+        let mut all = self.prescribed.clone();
+        for (i, &m) in self.free.iter().enumerate() {
+            all[m] = solved[i];
+        }
+        Some((all, solved.rows(n, rows).into_owned()))
+    }
+
     /// Mass matrix of the free coordinates.
     fn free_mass(&self) -> Mat<f64> {
         Mat::from_fn(self.free.len(), self.free.len(), |i, j| self.mass[(self.free[i], self.free[j])])

@@ -257,6 +257,13 @@ impl NewtonEuler {
         spatial(&axes.tr_mul(&angular(&self.load[k])), &axes.tr_mul(&linear(&self.load[k])))
     }
 
+    /// Acceleration of the recursion's frame of body `k` at the last sweep, less gravity, in its axes.
+    #[must_use]
+    pub fn body_acceleration(&self, k: usize) -> Vector6<f64> {
+        let motion = &self.motion[k];
+        spatial(&motion.axes.tr_mul(&motion.spin), &motion.axes.tr_mul(&motion.acceleration))
+    }
+
     /// Generalised force that each coordinate needs for the accelerations of the last sweep, less springs, dampers and elastic forces:
     /// `M u_dot + C` of hinge rates and of modes. Modal entries include the elastic forces.
     pub fn generalised_force(&self, system: &System, state: &State, pose: &PoseScratch, hinge: &mut [f64], modal: &mut [f64]) {

@@ -13,6 +13,8 @@
 //! 4. [`sweep::force_inward`]: residual forces `z`, innovations, Eq. 34 and 35;
 //! 5. [`sweep::acceleration_outward`]: accelerations, Eq. 36 to 41;
 //!
+//! closures are then held by a correction pass ([`closed_chain`]);
+//!
 //! and, only where something asks, [`hinge_load`]: `f(k') = P+ alpha+ + z+`, Eq. 18 and 38.
 //!
 //! # Symbols
@@ -38,6 +40,7 @@
 //! `Pi(eta) = [Jl(Phi_r eta) Phi_r; Phi_t]`, the rate of the finite rotation `exp(Phi_r eta)`, so that energy is conserved to the
 //! integrator's order. Gravity acts as the acceleration `-g` of the world, so `alpha` holds what an accelerometer would feel.
 
+pub mod closed_chain;
 pub mod dense;
 pub mod energy;
 pub mod flexible_inertia;
@@ -49,6 +52,7 @@ pub mod sweep;
 pub mod world;
 
 use crate::model::{State, System};
+use closed_chain::ClosedChain;
 use sweep::acceleration_outward::AccelerationScratch;
 use sweep::force_inward::ForceScratch;
 use sweep::inertia_inward::InertiaScratch;
@@ -86,6 +90,24 @@ pub enum DynamicsError {
         /// Name of the body.
         body: String,
     },
+    /// Closures that no multipliers can satisfy together.
+    #[error(
+        "closure \"{closure}\" contradicts the other closures or a prescribed hinge: {rank} of {rows} blocked directions are independent, and the others ask for a different motion"
+    )]
+    ContradictoryClosures {
+        /// Name of the closure with the largest part in it.
+        closure: String,
+        /// Independent directions.
+        rank: usize,
+        /// Blocked directions.
+        rows: usize,
+    },
+    /// Loop inertias that are not numbers.
+    #[error("the inertia of the loops (the first closed by \"{closure}\") left finite numbers")]
+    BrokenClosures {
+        /// Name of the first closure.
+        closure: String,
+    },
 }
 
 impl DynamicsError {
@@ -96,7 +118,8 @@ impl DynamicsError {
         match self {
             // half of the digits lost is beyond rounding
             Self::SingularHinge { inertia, scale, .. } => !(inertia.is_finite() && scale.is_finite() && *inertia >= -1e-8 * scale.abs()),
-            Self::SingularModes { .. } => false,
+            Self::SingularModes { .. } | Self::ContradictoryClosures { .. } => false,
+            Self::BrokenClosures { .. } => true,
         }
     }
 }
@@ -114,6 +137,8 @@ pub struct Workspace {
     pub force: ForceScratch,
     /// Accelerations.
     pub acceleration: AccelerationScratch,
+    /// Closures; none for a tree.
+    pub closed: Option<Box<ClosedChain>>,
 }
 
 impl Workspace {
@@ -126,6 +151,7 @@ impl Workspace {
             inertia: InertiaScratch::new(system),
             force: ForceScratch::new(system),
             acceleration: AccelerationScratch::new(system),
+            closed: ClosedChain::new(system),
         }
     }
 }
@@ -135,13 +161,18 @@ impl Workspace {
 /// Prescribed hinges must already stand at their functions' values ([`State::apply_prescribed`]). Nothing is allocated.
 ///
 /// # Errors
-/// [`DynamicsError`] if a hinge or a modal block is singular.
+/// [`DynamicsError`] if a hinge or a modal block is singular, or closures contradict one another.
 pub fn forward_dynamics(system: &System, state: &State, workspace: &mut Workspace) -> Result<(), DynamicsError> {
-    let Workspace { pose, velocity, inertia, force, acceleration } = workspace;
+    let Workspace { pose, velocity, inertia, force, acceleration, closed } = workspace;
     sweep::pose_outward::pose_outward(system, state, pose);
     sweep::velocity_outward::velocity_outward(system, state, pose, velocity);
     sweep::inertia_inward::inertia_inward(system, pose, inertia)?;
     sweep::force_inward::force_inward(system, state, pose, velocity, inertia, force);
     sweep::acceleration_outward::acceleration_outward(system, pose, velocity, inertia, force, acceleration);
+    if let Some(chain) = closed {
+        chain.follow_pose(system, state, pose);
+        chain.follow_rates(system, state, velocity);
+        chain.close(system, pose, inertia, force, acceleration)?;
+    }
     Ok(())
 }

@@ -9,6 +9,7 @@ use super::step_control::{Controller, Tolerance};
 use super::tableau::Tableau;
 use super::w_tableau::ROS34PW2;
 use super::{Stepper, tableau};
+use crate::dynamics::closed_chain::drift;
 use crate::dynamics::{DynamicsError, Workspace, forward_dynamics};
 use crate::model::{State, System};
 use thiserror::Error;
@@ -87,6 +88,16 @@ pub enum RunFailure {
         place: String,
         /// What to do.
         remedy: &'static str,
+    },
+    /// A loop that came open.
+    #[error("at t = {time} s closure \"{closure}\" came open by {residual:e} m or rad; take smaller steps or a smaller relative_tolerance")]
+    Opened {
+        /// s.
+        time: f64,
+        /// Name of the closure.
+        closure: String,
+        /// Largest violation left after the projection (m or rad).
+        residual: f64,
     },
     /// A step that became too small to advance time.
     #[error(
@@ -243,6 +254,9 @@ impl Run<'_, '_> {
                         self.chart.base.time = stop;
                         self.chart.clock_rest = 0.0;
                     }
+                    if !self.chart.system.closures.is_empty() {
+                        self.hold_closures(stepper)?;
+                    }
                     flow
                 });
                 match done {
@@ -261,6 +275,18 @@ impl Run<'_, '_> {
         Outcome::Completed
     }
 
+    /// Takes back what the last step drifted off the closures.
+    fn hold_closures(&mut self, stepper: &mut dyn Stepper) -> Result<(), RunFailure> {
+        let time = self.chart.base.time;
+        let wrap = |source| RunFailure::Dynamics { time, source };
+        let chart = &mut *self.chart;
+        let drift = drift::project(chart.system, &mut chart.base, &mut chart.workspace).map_err(wrap)?;
+        if drift.position > OPEN {
+            return Err(opened(chart.system, &chart.workspace, time));
+        }
+        if drift.moved { stepper.restart(chart).map_err(wrap) } else { Ok(()) }
+    }
+
     /// Finds a step towards `stop` that meets the tolerance; returns its length.
     fn advance(&mut self, stepper: &mut dyn Stepper, stop: f64) -> Result<f64, RunFailure> {
         loop {
@@ -277,6 +303,12 @@ impl Run<'_, '_> {
             let floor = 16.0 * f64::EPSILON * time.abs().max(stop.abs());
             if step < floor && step < left {
                 let place = fastest_place(self.chart);
+                if self.chart.workspace.closed.as_ref().is_some_and(|c| c.schur.distance_to_rank_loss() < CHANGE_POINT)
+                    && self.chart.base.is_finite()
+                {
+                    let place = format!("{place}, at a change point of the loops, which fixed steps (rk4) pass");
+                    return Err(RunFailure::StepUnderflow { time, step, place });
+                }
                 return Err(if self.sampled.is_finite() && self.sampled.time > time {
                     RunFailure::StepUnderflow { time, step, place }
                 } else {
@@ -346,6 +378,11 @@ impl Run<'_, '_> {
             self.sampled.time = at;
             self.sampled.apply_prescribed(self.chart.system);
             self.evaluations += 1;
+            if taken > 0.0 && !self.chart.system.closures.is_empty() {
+                // the interpolant leaves the closures as the step does
+                drift::project(self.chart.system, &mut self.sampled, &mut self.output)
+                    .map_err(|source| RunFailure::Dynamics { time: at, source })?;
+            }
             forward_dynamics(self.chart.system, &self.sampled, &mut self.output)
                 .map_err(|source| RunFailure::Dynamics { time: at, source })?;
             let sample = Sample { system: self.chart.system, state: &self.sampled, workspace: &self.output, work, steps: self.steps };
@@ -357,6 +394,19 @@ impl Run<'_, '_> {
         }
         Ok(flow)
     }
+}
+
+/// Violation (m or rad) that no projection should leave: the motion of such a system is not the system's.
+const OPEN: f64 = 1e-6;
+
+/// Relative singular value of the loops below which a step that fails does so at a change point.
+const CHANGE_POINT: f64 = 1e-2;
+
+/// The closure that is furthest open at the poses in `workspace`.
+fn opened(system: &System, workspace: &Workspace, time: f64) -> RunFailure {
+    let residual = |i: usize| workspace.closed.as_ref().map_or(0.0, |chain| chain.residual(system, i));
+    let worst = (0..system.closures.len()).max_by(|&i, &j| residual(i).total_cmp(&residual(j))).unwrap_or(0);
+    RunFailure::Opened { time, closure: system.closures[worst].name.clone(), residual: residual(worst) }
 }
 
 /// True if the last evaluation saw a body deformed to a thousand times its size (a million in inertia): only a diverging motion does that.

@@ -1,5 +1,6 @@
 //! From a definition by names to a [`System`] by indices: every check on what a system may be is here.
 
+use super::build_closure::ClosureDefinition;
 use super::error::{ModelError, Place};
 use super::flexible_body::{Attachment, FlexibleBody, InertiaOrder, ModalIntegrals};
 use super::hinge::{Hinge, HingeKind};
@@ -107,6 +108,8 @@ pub struct HingeDefinition {
     pub torque: Option<TimeFunction>,
     /// Prescribed coordinates.
     pub motion: Option<TimeFunction>,
+    /// Keep the initial coordinates and rates as given when closures are assembled.
+    pub held: bool,
 }
 
 /// Where a load acts.
@@ -146,13 +149,15 @@ pub struct Definition {
     pub hinges: Vec<HingeDefinition>,
     /// In any order.
     pub loads: Vec<LoadDefinition>,
+    /// In any order.
+    pub closures: Vec<ClosureDefinition>,
 }
 
-const fn place(section: &'static str, index: usize, key: &'static str) -> Place {
+pub(super) const fn place(section: &'static str, index: usize, key: &'static str) -> Place {
     Place { section, index, key }
 }
 
-fn list(names: impl Iterator<Item = String>) -> String {
+pub(super) fn list(names: impl Iterator<Item = String>) -> String {
     let names: Vec<_> = names.map(|n| format!("\"{n}\"")).collect();
     if names.is_empty() { "none".into() } else { names.join(", ") }
 }
@@ -178,6 +183,7 @@ impl Definition {
             gravity: self.gravity,
             bodies: Vec::with_capacity(order.len()),
             loads: Vec::new(),
+            closures: Vec::new(),
             prescribed: Vec::new(),
             position_count: 0,
             velocity_count: 0,
@@ -193,14 +199,20 @@ impl Definition {
             system.loads.push(load);
         }
         system.loads.sort_by_key(|l| l.body);
+        let mut rows = 0;
+        for index in 0..self.closures.len() {
+            let closure = builder.closure(index, rows, &system)?;
+            rows = closure.rows().end;
+            system.closures.push(closure);
+        }
         state.apply_prescribed(&system);
         Ok((system, state))
     }
 }
 
 /// A definition with its names indexed.
-struct Builder<'a> {
-    definition: &'a Definition,
+pub(super) struct Builder<'a> {
+    pub(super) definition: &'a Definition,
     numbers: HashMap<&'a str, usize>,
 }
 
@@ -208,8 +220,9 @@ impl Builder<'_> {
     fn check_names(&self) -> Result<(), ModelError> {
         let bodies = self.definition.bodies.iter().enumerate().map(|(i, b)| (i, &b.name, "body"));
         let hinges = self.definition.hinges.iter().enumerate().map(|(i, h)| (i, &h.name, "hinge"));
+        let closures = self.definition.closures.iter().enumerate().map(|(i, c)| (i, &c.name, "closure"));
         let mut seen = HashMap::new();
-        for (index, name, section) in bodies.chain(hinges) {
+        for (index, name, section) in bodies.chain(hinges).chain(closures) {
             let reserved = section == "body" && name == WORLD;
             if reserved || seen.insert((section, name), index).is_some() {
                 return Err(ModelError::DuplicateName { place: place(section, index, "name"), name: name.clone() });
@@ -218,7 +231,7 @@ impl Builder<'_> {
         Ok(())
     }
 
-    fn body_number(&self, name: &str, place: Place, item: &str) -> Result<usize, ModelError> {
+    pub(super) fn body_number(&self, name: &str, place: Place, item: &str) -> Result<usize, ModelError> {
         self.numbers.get(name).copied().ok_or_else(|| ModelError::UnknownBody {
             place,
             item: item.to_owned(),
@@ -501,6 +514,7 @@ impl Builder<'_> {
             rest: self.list(h, "rest", &given.rest, rates, true)?,
             torque: given.torque.clone(),
             motion: given.motion.clone().map(TimeFunction::splined),
+            held: given.held,
             kind,
         })
     }
@@ -607,14 +621,14 @@ impl Builder<'_> {
 }
 
 /// Refuses what no definition means: NaN and infinities.
-fn finite(values: &[f64], place: Place, item: &str) -> Result<(), ModelError> {
+pub(super) fn finite(values: &[f64], place: Place, item: &str) -> Result<(), ModelError> {
     match values.iter().find(|x| !x.is_finite()) {
         None => Ok(()),
         Some(&found) => Err(ModelError::BadNumber { place, item: item.to_owned(), found, expected: "finite" }),
     }
 }
 
-fn interface<'a>(modal: &'a ModalBody, name: &str, place: Place, item: &str, body: &str) -> Result<&'a Interface, ModelError> {
+pub(super) fn interface<'a>(modal: &'a ModalBody, name: &str, place: Place, item: &str, body: &str) -> Result<&'a Interface, ModelError> {
     modal.interface(name).ok_or_else(|| ModelError::UnknownInterface {
         place,
         item: item.to_owned(),
@@ -627,7 +641,7 @@ fn interface<'a>(modal: &'a ModalBody, name: &str, place: Place, item: &str, bod
 /// Lengths within this of one are taken for rounding of the printed digits and normalised.
 const UNIT_TOLERANCE: f64 = 1e-6;
 
-fn unit(q: &Quaternion, place: Place, item: &str) -> Result<Quaternion, ModelError> {
+pub(super) fn unit(q: &Quaternion, place: Place, item: &str) -> Result<Quaternion, ModelError> {
     let found = rotation::norm(q);
     if (found - 1.0).abs() <= UNIT_TOLERANCE {
         Ok(rotation::normalized(q))

@@ -6,7 +6,7 @@ use thiserror::Error;
 /// Part of a definition that an error points at: its list, its place in the list (0-based) and the key.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Place {
-    /// "body", "hinge" or "load"; "system" for what belongs to none.
+    /// "body", "hinge", "load" or "closure"; "system" for what belongs to none.
     pub section: &'static str,
     /// Index in that list.
     pub index: usize,
@@ -66,8 +66,8 @@ pub enum ModelError {
         /// The body.
         body: String,
     },
-    /// No interface named on a flexible parent.
-    #[error("hinge \"{item}\": the parent \"{body}\" is flexible; name one of its interfaces with parent_node (it has {known})")]
+    /// No interface named on a flexible body.
+    #[error("{} \"{item}\": body \"{body}\" is flexible; name one of its interfaces with {} (it has {known})", place.section, place.key)]
     MissingInterface {
         /// Where.
         place: Place,
@@ -142,8 +142,8 @@ pub enum ModelError {
         /// Its length.
         found: f64,
     },
-    /// Hinge axes that do not fit the kind.
-    #[error("hinge \"{item}\": {found}; {expected}")]
+    /// Axes, or another key, that do not fit the kind.
+    #[error("{} \"{item}\": {found}; {expected}", place.section)]
     BadAxes {
         /// Where.
         place: Place,
@@ -198,6 +198,16 @@ pub enum ModelError {
         /// The body.
         body: String,
     },
+    /// A closure between two frames that cannot move relative to one another.
+    #[error("closure \"{item}\": both frames are fixed to \"{body}\"; join two different bodies")]
+    ClosureOnOneBody {
+        /// Where.
+        place: Place,
+        /// The closure.
+        item: String,
+        /// The body, or "world".
+        body: String,
+    },
     /// A table that cannot be used.
     #[error("{} \"{item}\": {}: {source}", place.section, place.key)]
     Table {
@@ -232,6 +242,7 @@ impl ModelError {
             | Self::MotionOfQuaternion { place, .. }
             | Self::Excluded { place, .. }
             | Self::MomentOnNode { place, .. }
+            | Self::ClosureOnOneBody { place, .. }
             | Self::Table { place, .. } => Some(place),
         }
     }

@@ -302,6 +302,8 @@ pub struct Hinge {
     pub torque: Option<TimeFunction>,
     /// Prescribed coordinates.
     pub motion: Option<TimeFunction>,
+    /// Initial coordinates and rates stay as given when closures are assembled.
+    pub held: bool,
 }
 
 impl Hinge {
@@ -449,6 +451,7 @@ mod tests {
                 rest: (0..count).map(|i| 0.1 * i as f64).collect(),
                 torque: None,
                 motion: None,
+                held: false,
                 kind,
             };
             let base = general_position(&hinge.kind);

@@ -1,8 +1,10 @@
-//! What a system is: bodies joined by hinges into a tree, and what acts on them. Frozen once built.
+//! What a system is: bodies joined by hinges into a tree, closures that make loops of it, and what acts on them. Frozen once built.
 //!
 //! [`build`] turns a definition by names into a [`System`] by indices and refuses what cannot be; [`State`] holds what is integrated.
 
 pub mod build;
+pub mod build_closure;
+pub mod closure;
 pub mod error;
 pub mod flexible_body;
 pub mod hinge;
@@ -12,6 +14,7 @@ pub mod state;
 pub mod surface;
 pub mod time_function;
 
+pub use closure::{Closure, ClosureJoint, ClosureKind, ClosureMethod, ClosureSide};
 pub use error::ModelError;
 pub use flexible_body::{Attachment, FlexibleBody, InertiaOrder};
 pub use hinge::{Hinge, HingeKind};
@@ -104,7 +107,7 @@ impl Body {
     }
 }
 
-/// A multibody system of tree topology.
+/// A multibody system: a tree, and the closures that close loops in it.
 #[derive(Debug, Clone)]
 pub struct System {
     /// Uniform gravity (m/s^2, inertial axes).
@@ -113,6 +116,8 @@ pub struct System {
     pub bodies: Vec<Body>,
     /// External loads, sorted by body.
     pub loads: Vec<Load>,
+    /// Closures in the order of their definition.
+    pub closures: Vec<Closure>,
     /// Indices of bodies whose hinge is prescribed.
     pub prescribed: Vec<usize>,
     /// Length of [`State::position`].
@@ -136,6 +141,12 @@ impl System {
     #[must_use]
     pub fn hinge_index(&self, name: &str) -> Option<usize> {
         self.bodies.iter().position(|b| b.hinge.name == name)
+    }
+
+    /// Number of multipliers of all closures.
+    #[must_use]
+    pub fn closure_rows(&self) -> usize {
+        self.closures.last().map_or(0, |c| c.rows().end)
     }
 
     /// Times (s) at which some function of the system jumps in a derivative, ascending, each once.

@@ -7,7 +7,7 @@ use crate::dynamics::hinge_load::hinge_load;
 use crate::dynamics::inverse::NewtonEuler;
 use crate::dynamics::world::WorldFrame;
 use crate::dynamics::{DynamicsError, Workspace, forward_dynamics};
-use crate::model::{State, System};
+use crate::model::{Closure, ClosureJoint, State, System};
 use crate::spatial::shift::{angular, linear};
 use nalgebra::Vector6;
 use serde::ser::{Serialize, SerializeMap, Serializer};
@@ -95,8 +95,21 @@ pub struct BodyEvaluation {
 pub struct ClosureEvaluation {
     /// On body b.
     pub load: LoadRecord,
+    /// Force on coordinate b of a gear (N m or N); none for joints between frames.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub coordinate_force: Option<f64>,
     /// Largest violation (m or rad).
     pub residual: f64,
+}
+
+fn closures(system: &System, workspace: &Workspace) -> Named<ClosureEvaluation> {
+    let Some(chain) = &workspace.closed else { return Named::default() };
+    let record = |(index, closure): (usize, &Closure)| {
+        let coordinate_force = matches!(closure.joint, ClosureJoint::Gear { .. }).then(|| chain.lambda[closure.first_row]);
+        let load = chain.load(system, index).into();
+        (closure.name.clone(), ClosureEvaluation { load, coordinate_force, residual: chain.residual(system, index) })
+    };
+    system.closures.iter().enumerate().map(record).collect()
 }
 
 /// Energies (J).
@@ -160,7 +173,7 @@ impl Evaluation {
         Self {
             hinges: in_order().map(hinge).collect(),
             bodies: in_order().filter_map(flexible).collect(),
-            closures: Named::default(),
+            closures: closures(system, workspace),
             energy: EnergyRecord { kinetic: energy.kinetic, strain: energy.strain, potential: energy.potential },
             audit: AuditRecord { load_residual: NewtonEuler::new(system).audit(system, state, workspace).load },
         }
@@ -202,7 +215,7 @@ mod tests {
             gravity: Vector3::new(0.0, 0.0, -9.81),
             bodies: vec![rigid("tip", 1.0 / 3.0), rigid("arm", 2.0)],
             hinges: vec![hinge("elbow", "arm", "tip"), hinge("shoulder", "world", "arm")],
-            loads: vec![],
+            ..Definition::default()
         }
     }
 

@@ -2,6 +2,7 @@
 
 use super::plan::OutputPlan;
 use super::surface::StressPeak;
+use crate::dynamics::closed_chain::ClosedChain;
 use crate::dynamics::energy::{Energy, Momentum, balance};
 use crate::dynamics::hinge_load::hinge_load;
 use crate::dynamics::inverse::{AuditResidual, NewtonEuler};
@@ -25,6 +26,8 @@ pub struct OutputFrame {
     pub stress: Vec<StressPeak>,
     /// Of the audit, if the plan has one.
     pub audit: Option<AuditResidual>,
+    /// Largest violation of a closure (m or rad), if there are closures.
+    pub closure: Option<f64>,
 }
 
 /// Evaluates frames into room of its own.
@@ -48,6 +51,7 @@ impl FrameEvaluator {
             momentum: Momentum::default(),
             stress: vec![StressPeak::default(); plan.surfaces.len()],
             audit: None,
+            closure: None,
         };
         Self { hinges, audit: plan.audit.then(|| NewtonEuler::new(system)), frame }
     }
@@ -65,6 +69,8 @@ impl FrameEvaluator {
                 *peak = surface.surface.stress_peak(&state.modal_position[system.bodies[surface.body].modal_range()]);
             }
         }
+        let worst = |chain: &ClosedChain| (0..system.closures.len()).map(|i| chain.residual(system, i)).fold(0.0, f64::max);
+        frame.closure = workspace.closed.as_deref().map(worst);
         frame.audit = audit.as_mut().map(|audit| audit.audit(system, state, workspace));
     }
 }

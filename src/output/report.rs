@@ -7,7 +7,7 @@ use serde::Serialize;
 /// Error figures; none where a figure does not apply.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct ErrorFigures {
-    /// Largest |E(t) - E(0) - work| at output times, relative to the largest kinetic energy.
+    /// Largest |E(t) - E(0) - work| at output times, relative to the largest kinetic energy, stored energy change or work.
     pub energy: f64,
     /// Drift of linear and angular momentum of a system that nothing outside acts on, relative to the momentum its kinetic energy allows.
     pub momentum: Option<f64>,

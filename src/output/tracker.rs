@@ -7,7 +7,7 @@ use super::report::{BodyPeak, ErrorFigures, Exceedance, HingePeak, Peaks};
 use super::scales::plain;
 use crate::dynamics::energy::Momentum;
 use crate::integrate::Sample;
-use crate::model::{HingeKind, System};
+use crate::model::{ClosureJoint, HingeKind, System};
 use crate::spatial::shift::{angular, linear};
 
 /// Something an output time made known.
@@ -83,6 +83,7 @@ pub struct Tracker {
     angular_drift: f64,
     span: f64,
     audit: Option<f64>,
+    closure: Option<f64>,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -130,6 +131,7 @@ impl Tracker {
             angular_drift: 0.0,
             span: 0.0,
             audit: None,
+            closure: None,
         }
     }
 
@@ -157,6 +159,9 @@ impl Tracker {
         self.follow_balances(sample, frame);
         if let Some(audit) = frame.audit {
             self.audit = Some(self.audit.unwrap_or(0.0).max(audit.load));
+        }
+        if let Some(closure) = frame.closure {
+            self.closure = Some(self.closure.unwrap_or(0.0).max(closure));
         }
     }
 
@@ -215,13 +220,13 @@ impl Tracker {
     /// Error figures so far; `local` is that of the step control.
     #[must_use]
     pub fn errors(&self, local: Option<f64>) -> ErrorFigures {
-        // a system that never moves is measured against the energy that came and went
-        let scale = if self.largest_kinetic > 0.0 { self.largest_kinetic } else { self.largest_change };
+        // slow loading stores energy without moving much: measure against what moved or came and went, whichever is more
+        let scale = self.largest_kinetic.max(self.largest_change);
         ErrorFigures {
             energy: ratio(self.energy_error, scale),
             momentum: self.isolated.then(|| self.momentum_error()),
             audit: self.audit,
-            closure: None,
+            closure: self.closure,
             local,
         }
     }
@@ -248,5 +253,7 @@ fn is_isolated(system: &System) -> bool {
             && hinge.torque.is_none()
             && hinge.motion.is_none()
     });
-    floats && system.gravity.norm() == 0.0 && system.loads.is_empty()
+    let anchored =
+        system.closures.iter().any(|c| matches!(&c.joint, ClosureJoint::Frames { a, b, .. } if a.body.is_none() || b.body.is_none()));
+    floats && !anchored && system.gravity.norm() == 0.0 && system.loads.is_empty()
 }

@@ -5,11 +5,12 @@ use super::functions::function;
 use super::locate::{Step, first_not_finite};
 use super::settings;
 use super::spec::{BodySpec, FunctionSpec, HingeSpec, LoadSpec, ModesRule, ModesSpec, MonitorSpec, Numbers, SceneSpec};
+use crate::dynamics::closed_chain::assembly;
 use crate::integrate::simulate::Method;
 use crate::model::build::{
     BodyDefinition, BodyDefinitionKind, Definition, FlexibleDefinition, Frame, HingeDefinition, LoadDefinition, PointDefinition,
 };
-use crate::model::{InertiaOrder, LoadAxes, State, System, TimeFunction};
+use crate::model::{ClosureMethod, InertiaOrder, LoadAxes, State, System, TimeFunction};
 use nalgebra::{Matrix3, Vector3, Vector6};
 use std::path::Path;
 
@@ -24,6 +25,8 @@ pub struct Overrides {
     pub rigid: Vec<String>,
     /// Simulated time (s).
     pub duration: Option<f64>,
+    /// Method for all closures.
+    pub closure_method: Option<String>,
 }
 
 /// Limits to watch at every output time.
@@ -105,16 +108,12 @@ pub fn assemble(source: Source, overrides: &Overrides) -> Result<Scene, SceneErr
         let message = "the number is not finite; write a finite number".to_owned();
         return Err(SceneError::Value { path: source.path, at, message });
     }
-    if !spec.closure.is_empty() {
-        return Err(source.value(
-            &[Step::Key("closure"), Step::Index(0)],
-            "closed chains are not part of this version; remove the [[closure]] or replace it by a stiff spring on a tree hinge",
-        ));
-    }
     check_overrides(&spec, overrides)?;
     let mut assembly = Assembly { source: &source, overrides, left_out: Vec::new(), files: Files::default(), chosen: Vec::new() };
     let definition = assembly.definition(&spec)?;
-    let (system, state) = definition.build().map_err(|e| source.model(&e))?;
+    let (system, mut state) = definition.build().map_err(|e| source.model(&e))?;
+    assembly::assemble(&system, &mut state)
+        .map_err(|e| source.value(&[Step::Key("closure"), Step::Index(e.closure), Step::Key("name")], e.to_string()))?;
     let Assembly { mut left_out, .. } = assembly;
 
     if !(spec.output.rate_hz > 0.0) {
@@ -185,6 +184,10 @@ struct Assembly<'a> {
 
 fn check_overrides(spec: &SceneSpec, overrides: &Overrides) -> Result<(), SceneError> {
     let flexible: Vec<_> = spec.body.iter().filter(|b| b.modal_file.is_some()).map(|b| b.name.as_str()).collect();
+    if let Some(method) = overrides.closure_method.as_deref().filter(|m| ClosureMethod::from_name(m).is_none()) {
+        let message = format!("\"{method}\" is not a closure method of this version; known: {}", ClosureMethod::NAMES.join(", "));
+        return Err(SceneError::Override { option: "--closure-method", message });
+    }
     match overrides.rigid.iter().find(|name| !flexible.contains(&name.as_str())) {
         None => Ok(()),
         Some(name) => Err(SceneError::Override {
@@ -251,7 +254,9 @@ fn describe_left_out(spec: &SceneSpec, system: &System, hinges: &[usize], left_o
     if !spec.output.audit {
         left_out.push("load audit".into());
     }
-    left_out.push("closures".into());
+    if system.closures.is_empty() {
+        left_out.push("closures".into());
+    }
 }
 
 impl Assembly<'_> {
@@ -266,6 +271,9 @@ impl Assembly<'_> {
         }
         for (index, load) in spec.load.iter().enumerate() {
             definition.loads.push(self.load(index, load, spec, &definition)?);
+        }
+        for (index, closure) in spec.closure.iter().enumerate() {
+            definition.closures.push(super::closures::closure(index, closure, self.overrides.closure_method.as_deref(), self.source)?);
         }
         Ok(definition)
     }
@@ -390,6 +398,7 @@ impl Assembly<'_> {
             rest: numbers(&hinge.rest),
             torque: of(&hinge.torque, "torque")?,
             motion: of(&hinge.motion, "motion")?,
+            held: hinge.held,
         })
     }
 

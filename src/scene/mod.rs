@@ -1,6 +1,7 @@
 //! Scene files: from TOML to a system, its initial state and the settings of a run.
 
 pub mod assemble;
+pub mod closures;
 pub mod error;
 mod functions;
 mod locate;

@@ -194,6 +194,49 @@ pub struct HingeSpec {
     pub torque: Option<FunctionSpec>,
     /// Prescribed motion.
     pub motion: Option<FunctionSpec>,
+    /// Keep position and velocity as given when closures are assembled.
+    #[serde(default)]
+    pub held: bool,
+}
+
+/// `[[closure]]`: two frames and a kind, or `kind = "gear"` with two hinges and a ratio.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ClosureSpec {
+    /// Unique.
+    pub name: String,
+    /// Kind.
+    pub kind: String,
+    /// One axis, in the axes of frame a.
+    pub axis: Option<[f64; 3]>,
+    /// Several axes, in the axes of frame a.
+    pub axes: Option<Vec<[f64; 3]>>,
+    /// Body or "world".
+    pub body_a: Option<String>,
+    /// Interface of a flexible body a.
+    pub node_a: Option<String>,
+    /// Frame on a.
+    pub frame_a: Option<FrameSpec>,
+    /// Body or "world".
+    pub body_b: Option<String>,
+    /// Interface of a flexible body b.
+    pub node_b: Option<String>,
+    /// Frame on b.
+    pub frame_b: Option<FrameSpec>,
+    /// Driving hinge of a gear.
+    pub hinge_a: Option<String>,
+    /// 1-based coordinate of it.
+    pub coordinate_a: Option<usize>,
+    /// Driven hinge of a gear.
+    pub hinge_b: Option<String>,
+    /// 1-based coordinate of it.
+    pub coordinate_b: Option<usize>,
+    /// `theta_b = ratio * theta_a + offset`
+    pub ratio: Option<f64>,
+    /// theta_b at theta_a = 0.
+    pub offset: Option<f64>,
+    /// "auto", "tree_augmented" or "constraint_embedding".
+    pub method: Option<String>,
 }
 
 /// `[[load]]`
@@ -342,9 +385,9 @@ pub struct SceneSpec {
     /// Hinges.
     #[serde(default)]
     pub hinge: Vec<HingeSpec>,
-    /// Loops; recognised so that they can be refused by name.
+    /// Loops.
     #[serde(default)]
-    pub closure: Vec<toml::Table>,
+    pub closure: Vec<ClosureSpec>,
     /// External loads.
     #[serde(default)]
     pub load: Vec<LoadSpec>,

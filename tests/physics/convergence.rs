@@ -26,7 +26,9 @@ fn craft(torque: Option<TimeFunction>) -> (System, State) {
     let mut tip = hinge("tip", "spherical", &[], "beam", "dish", [0.1, 0.0, 0.0]);
     (tip.parent_node, tip.velocity) = (Some("tip".into()), vec![0.5, 1.5, -0.7]);
     let bodies = vec![rigid("hub", 4.0, [0.1, 0.0, 0.2], [1.0, 1.5, 1.2]), beam, rigid("dish", 0.5, [0.2, 0.1, 0.0], [0.05, 0.08, 0.1])];
-    Definition { gravity: Vector3::new(0.0, 0.0, -1.0), bodies, hinges: vec![base, root, tip], loads: vec![] }.build().unwrap()
+    Definition { gravity: Vector3::new(0.0, 0.0, -1.0), bodies, hinges: vec![base, root, tip], loads: vec![], closures: vec![] }
+        .build()
+        .unwrap()
 }
 
 /// Dormand-Prince steps of one length after a short start: a tolerance that nothing exceeds.

@@ -83,7 +83,7 @@ fn case(seed: u64, boundary: Boundary, root: &'static str) -> Case {
         axes: LoadAxes::World,
     };
     let gravity = vector(rng, 9.0);
-    let definition = Definition { gravity, bodies: vec![panel, tip], hinges: vec![free, turn], loads: vec![load] };
+    let definition = Definition { gravity, bodies: vec![panel, tip], hinges: vec![free, turn], loads: vec![load], closures: vec![] };
     let (system, state) = definition.build().unwrap();
     Case { body, root, child, tip_frame, axis, tip_points, definition, system, state, force, moment }
 }

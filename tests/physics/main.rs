@@ -4,6 +4,7 @@
 #[path = "../support/mod.rs"]
 mod support;
 
+mod closed_chain;
 mod conservation;
 mod convergence;
 mod extremes;

@@ -177,7 +177,8 @@ fn published_heavy_top_precesses() {
     let mut pivot = hinge("pivot", "spherical", &[], WORLD, "top", [0.0; 3]);
     pivot.velocity = vec![0.0, 150.0, -4.61538];
     let bodies = vec![rigid("top", 15.0, [0.0, 1.0, 0.0], [0.234_375, 0.468_75, 0.234_375])];
-    let (system, start) = Definition { gravity: Vector3::new(0.0, 0.0, -G), bodies, hinges: vec![pivot], loads: vec![] }.build().unwrap();
+    let (system, start) =
+        Definition { gravity: Vector3::new(0.0, 0.0, -G), bodies, hinges: vec![pivot], loads: vec![], closures: vec![] }.build().unwrap();
     let center = |end: &State| {
         let mut frame = [WorldFrame::default()];
         world_frames(&system, &evaluated(&system, end).pose, &mut frame);
@@ -226,7 +227,8 @@ fn published_free_base_turns_back_under_a_prescribed_arm() {
 fn free_fall_is_exact_for_any_step() {
     let bodies = vec![rigid("stone", 2.0, [0.0; 3], [1.0; 3])];
     let hinges = vec![hinge("fall", "free", &[], WORLD, "stone", [0.0; 3])];
-    let (system, start) = Definition { gravity: Vector3::new(0.0, 0.0, -G), bodies, hinges, loads: vec![] }.build().unwrap();
+    let (system, start) =
+        Definition { gravity: Vector3::new(0.0, 0.0, -G), bodies, hinges, loads: vec![], closures: vec![] }.build().unwrap();
     for (step, duration) in [(1e-15, 1e-12), (1e-3, 1.0), (1.0, 1e3), (1e3, 1e5)] {
         let end = end_of(&system, &start, rk4(step), duration);
         // each of the steps rounds a sum once

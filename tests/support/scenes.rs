@@ -57,7 +57,7 @@ pub fn chain(links: Vec<BodyDefinition>, ends: &[[f64; 3]]) -> Definition {
             hinge(&format!("h{}", i + 1), "revolute", &[Z], &parent, &name(i), at)
         })
         .collect();
-    Definition { gravity: Vector3::new(0.0, -G, 0.0), hinges, bodies: links, loads: vec![] }
+    Definition { gravity: Vector3::new(0.0, -G, 0.0), hinges, bodies: links, loads: vec![], closures: vec![] }
 }
 
 /// Uniform rods along x: mass and length of each.

@@ -157,6 +157,7 @@ fn random_hinge(rng: &mut StdRng, i: usize, definition: &Definition, recipe: &Re
         rest: if springs && rates > 0 { vec![0.1] } else { vec![] },
         torque: (recipe.loads && rates > 0 && !prescribed && rng.random_bool(0.5)).then(|| waves(rng, rates)),
         motion: prescribed.then(|| waves(rng, rates)),
+        held: false,
     }
 }
 

@@ -33,9 +33,9 @@ pub struct BodyForce {
 pub struct ForceScratch {
     /// One per body.
     pub bodies: Vec<BodyForce>,
-    /// External force on the rigid rows of each body, in the recursion's frame; empty without loads.
+    /// External force on the rigid rows of each body, in the recursion's frame; empty without loads and closures.
     pub external: Vec<Vector6<f64>>,
-    /// External force on the modes, indexed like the modal coordinates; empty without loads.
+    /// External force on the modes, indexed like the modal coordinates; empty without loads and closures.
     pub external_modal: Vec<f64>,
     /// `nu` of the modes, indexed like the modal coordinates.
     pub nu_modal: Vec<f64>,
@@ -50,7 +50,7 @@ impl ForceScratch {
     /// Room for `system`.
     #[must_use]
     pub fn new(system: &System) -> Self {
-        let loaded = !system.loads.is_empty();
+        let (loaded, closed) = (!system.loads.is_empty(), !system.closures.is_empty());
         Self {
             bodies: vec![
                 BodyForce {
@@ -62,8 +62,8 @@ impl ForceScratch {
                 };
                 system.bodies.len()
             ],
-            external: vec![Vector6::zeros(); if loaded { system.bodies.len() } else { 0 }],
-            external_modal: vec![0.0; if loaded { system.modal_count } else { 0 }],
+            external: vec![Vector6::zeros(); if loaded || closed { system.bodies.len() } else { 0 }],
+            external_modal: vec![0.0; if loaded || closed { system.modal_count } else { 0 }],
             nu_modal: vec![0.0; system.modal_count],
             applied: vec![0.0; system.velocity_count],
             world: vec![WorldFrame::default(); if system.has_world_loads() { system.bodies.len() } else { 0 }],
@@ -106,6 +106,9 @@ pub fn force_inward(
 
 /// Forces of loads, springs, dampers and motors at `state`: the part of the sweep that needs no inertias.
 pub fn gather_applied(system: &System, state: &State, pose: &PoseScratch, out: &mut ForceScratch) {
+    // closures add their forces after the free pass, so that these start anew in every evaluation
+    out.external.fill(Vector6::zeros());
+    out.external_modal.fill(0.0);
     if !system.loads.is_empty() {
         apply_loads(system, state, pose, out);
     }
@@ -205,8 +208,6 @@ fn apply_loads(system: &System, state: &State, pose: &PoseScratch, out: &mut For
     if !out.world.is_empty() {
         world_frames(system, pose, &mut out.world);
     }
-    out.external.fill(Vector6::zeros());
-    out.external_modal.fill(0.0);
     for load in &system.loads {
         let body = &system.bodies[load.body];
         let value = match load.axes {

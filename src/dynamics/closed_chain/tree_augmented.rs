@@ -1,0 +1,86 @@
+//! The correction pass: from the free accelerations of the tree to those of the closed chain, and all loads with them.
+//!
+//! `lambda = -(G M^-1 G')^-1 (G u_dot_free + bias)`, then one more pass with `G' lambda` as external forces; its accelerations and
+//! residual forces are added to those of the free pass, so that every hinge load is the sum of both passes (Paper Eq. 42 to 46).
+//! Cost: O(N n_c + n_c^3), N bodies of the loops and n_c blocked directions.
+
+use super::ClosedChain;
+use super::schur::{NotFactored, REDUNDANT};
+use crate::dynamics::DynamicsError;
+use crate::dynamics::sweep::acceleration_outward::AccelerationScratch;
+use crate::dynamics::sweep::force_inward::{ForceScratch, world_acceleration};
+use crate::dynamics::sweep::inertia_inward::InertiaScratch;
+use crate::dynamics::sweep::pose_outward::PoseScratch;
+use crate::model::System;
+
+/// Share of the closures' accelerations that may lie where no multiplier reaches before they are said to contradict one another.
+const CONTRADICTION: f64 = 1e-6;
+
+impl ClosedChain {
+    /// Adds the correction pass to the free pass in `force` and `acceleration`; poses and rates must have been followed.
+    ///
+    /// # Errors
+    /// If the closures and prescribed motions contradict one another.
+    pub fn close(
+        &mut self,
+        system: &System,
+        pose: &PoseScratch,
+        inertia: &InertiaScratch,
+        force: &mut ForceScratch,
+        acceleration: &mut AccelerationScratch,
+    ) -> Result<(), DynamicsError> {
+        self.assemble_loop_inertia(system, pose, inertia);
+        let broken = |_: NotFactored| DynamicsError::BrokenClosures { closure: system.closures[0].name.clone() };
+        self.schur.factor(REDUNDANT).map_err(broken)?;
+        let mut right = std::mem::take(&mut self.right);
+        self.accelerations(system, acceleration, world_acceleration(system), &mut right);
+        let mut sizes = 0.0_f64;
+        for (closure, at) in system.closures.iter().zip(&self.closures) {
+            for (r, bias) in right[closure.rows()].iter_mut().zip(&at.bias) {
+                sizes = sizes.max(r.abs()).max(bias.abs());
+                *r = -(*r + bias);
+            }
+        }
+        let (missed, size) = self.schur.solve(&right, &mut self.lambda);
+        let rigid = (0..right.len()).filter(|&row| !self.schur.responds(row)).fold(0.0_f64, |m, row| m.max(right[row].abs()));
+        self.right = right;
+        // a right-hand side of rounding has no direction: it is measured against the accelerations it is the difference of
+        let felt = self.support.iter().map(|&k| acceleration.alpha[k].amax()).fold(sizes, f64::max);
+        let scale = self.schur.largest_scale();
+        if (missed > CONTRADICTION * size && missed > 1e-9 * felt * scale) || rigid > 1e-9 * felt {
+            return Err(self.contradiction(system));
+        }
+
+        let lambda = std::mem::take(&mut self.lambda);
+        self.push(system, &lambda);
+        self.lambda = lambda;
+        self.response.solve(system, pose, inertia, &self.all);
+        let part = &self.response;
+        for k in 0..system.bodies.len() {
+            force.bodies[k].z_plus += part.z_plus[k];
+            acceleration.alpha_plus[k] += part.alpha_plus[k];
+            acceleration.alpha[k] += part.alpha[k];
+        }
+        let add = |into: &mut [f64], more: &[f64]| into.iter_mut().zip(more).for_each(|(a, b)| *a += b);
+        add(&mut acceleration.modal, &part.modal);
+        for body in system.bodies.iter().filter(|b| !b.hinge.is_prescribed()) {
+            add(&mut acceleration.hinge[body.velocity_range()], &part.hinge[body.velocity_range()]);
+        }
+        // to audits and power the closures are forces like any other
+        force.external.iter_mut().zip(&part.external).for_each(|(a, b)| *a += b);
+        add(&mut force.external_modal, &part.external_modal);
+        add(&mut force.applied, &part.applied);
+        Ok(())
+    }
+
+    /// The closure that has most of its directions where no multiplier reaches.
+    fn contradiction(&self, system: &System) -> DynamicsError {
+        let share = |i: usize| system.closures[i].rows().map(|r| self.schur.redundancy(r)).fold(0.0, f64::max);
+        let worst = (0..system.closures.len()).max_by(|&i, &j| share(i).total_cmp(&share(j))).unwrap_or(0);
+        DynamicsError::ContradictoryClosures {
+            closure: system.closures[worst].name.clone(),
+            rank: self.schur.rank(),
+            rows: self.schur.size(),
+        }
+    }
+}
