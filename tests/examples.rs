@@ -7,6 +7,7 @@ use pliant::dynamics::hinge_load::hinge_load;
 use pliant::dynamics::world::{WorldFrame, world_frames};
 use pliant::integrate::{Flow, Observer, Outcome, Sample, Settings, simulate};
 use pliant::output::Evaluation;
+use pliant::scene::error::Source;
 use pliant::scene::{Overrides, Scene, assemble};
 use std::path::Path;
 
@@ -138,4 +139,14 @@ fn four_bar_starts_with_the_accelerations_of_the_closed_solution_and_stays_close
     }
     let end = run(&scene);
     assert!(end.position.iter().all(|x| x.is_finite()));
+}
+
+#[test]
+fn the_scene_of_the_readme_is_accepted_and_runs() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let readme = std::fs::read_to_string(root.join("README.md")).unwrap();
+    let text = readme.split("```toml\n").nth(1).and_then(|t| t.split("```").next()).unwrap().to_owned();
+    let scene = assemble::assemble(Source { path: root.join("README.toml"), text }, &Overrides::default()).unwrap();
+    let record = run(&scene);
+    assert!(record.position.iter().all(|x| x.is_finite()));
 }

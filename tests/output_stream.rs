@@ -1,5 +1,7 @@
 //! What a run writes: results file, viewer stream and report, read back and held against one another.
 
+#![cfg(all(feature = "hdf5", feature = "rerun"))]
+
 use nalgebra::{Matrix3, Vector3};
 use pliant::integrate::simulate::Method;
 use pliant::integrate::step_control::Tolerance;
@@ -74,6 +76,7 @@ fn hub_with_two_panels() -> Result<(System, State, OutputPlan), Box<dyn Error>> 
         bodies: vec![hub, panel("left"), panel("right")],
         hinges: vec![base, drive("left/drive", "left", 1.0), drive("right drive", "right", -1.0)],
         loads: vec![],
+        closures: vec![],
     };
     let (system, state) = definition.build()?;
     let index = |name: &str| system.body_index(name).ok_or("no such body");

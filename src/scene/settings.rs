@@ -48,7 +48,17 @@ pub fn method(
     }
     let tolerance = Tolerance { relative: spec.relative_tolerance, absolute: spec.absolute_tolerance };
     let largest_step = spec.largest_step.unwrap_or(f64::INFINITY);
+    let looped = !system.closures.is_empty();
     match name.or(spec.integrator.as_deref()).unwrap_or("auto") {
+        "auto" if looped => {
+            let reason = "dormand_prince: loops are integrated by the explicit methods".to_owned();
+            Ok((Method::DormandPrince { tolerance, largest_step }, Some(reason)))
+        }
+        "rosenbrock_w" if looped => {
+            let message =
+                "rosenbrock_w does not integrate scenes with closures in this version; use auto, dormand_prince or rk4".to_owned();
+            Err(refused(name, message, source))
+        }
         "auto" => {
             let choice = choose(system, tolerance, largest_step, rate_hz);
             Ok((choice.method, Some(choice.reason)))
@@ -63,10 +73,15 @@ pub fn method(
         other => {
             let known = INTEGRATORS.map(|i| i.0).join(", ");
             let message = format!("\"{other}\" is not an integrator; known: {known}");
-            Err(match name {
-                Some(_) => SceneError::Override { option: "--integrator", message },
-                None => source.value(&at("integrator"), message),
-            })
+            Err(refused(name, message, source))
         }
+    }
+}
+
+/// An integrator that cannot be, named by the command line or by the scene.
+fn refused(name: Option<&str>, message: String, source: &Source) -> SceneError {
+    match name {
+        Some(_) => SceneError::Override { option: "--integrator", message },
+        None => source.value(&[Step::Key("simulation"), Step::Key("integrator")], message),
     }
 }

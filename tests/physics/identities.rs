@@ -82,8 +82,9 @@ fn response_to_generalised_forces_solves_with_the_mass_matrix_and_what_is_added_
         let wave = |i: usize| (1.7 * i as f64 + 0.3).sin();
         let force: Vec<f64> = (0..n).map(wave).collect();
         // every block: nothing on some hinges, a full matrix on others
-        let hinge =
-            |k: usize| (k % 3 != 0).then(|| std::array::from_fn(|i| std::array::from_fn(|j| if i == j { 9.0 } else { wave(i + j) })));
+        let hinge = |k: usize| {
+            (!k.is_multiple_of(3)).then(|| std::array::from_fn(|i| std::array::from_fn(|j| if i == j { 9.0 } else { wave(i + j) })))
+        };
         let added = AddedInertia {
             modal: (0..system.modal_count).map(|j| 1.0 + 50.0 * (j as f64)).collect(),
             hinge: (0..system.bodies.len()).map(hinge).collect(),

@@ -162,7 +162,8 @@ fn a_flexible_body_of_no_retained_modes_is_the_rigid_one() {
         let mut pin = hinge("pin", "universal", &[[0.0, 1.0, 0.0], Z], WORLD, &body.name, [0.0; 3]);
         (pin.position, pin.velocity) = (vec![0.3, -0.2], vec![1.1, 0.7]);
         let gravity = nalgebra::Vector3::new(0.0, 0.0, -9.81);
-        let (system, state) = Definition { gravity, bodies: vec![body], hinges: vec![pin], loads: vec![] }.build().unwrap();
+        let (system, state) =
+            Definition { gravity, bodies: vec![body], hinges: vec![pin], loads: vec![], closures: vec![] }.build().unwrap();
         let mut workspace = Workspace::new(&system);
         forward_dynamics(&system, &state, &mut workspace).unwrap();
         [workspace.acceleration.hinge.as_slice(), hinge_load(&workspace, 0).as_slice()].concat()

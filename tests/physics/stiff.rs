@@ -90,7 +90,7 @@ fn panel(fastest_hz: f64) -> (System, State) {
     let mut tip = hinge("tip", "fixed", &[], "panel", "mass", [0.0; 3]);
     tip.parent_node = Some("tip".into());
     let bodies = vec![rigid("hub", 50.0, [0.0; 3], [30.0; 3]), panel, rigid("mass", 2.0, [0.1, 0.0, 0.0], [0.1; 3])];
-    Definition { gravity: Vector3::zeros(), bodies, hinges: vec![base, root, tip], loads: vec![] }.build().unwrap()
+    Definition { gravity: Vector3::zeros(), bodies, hinges: vec![base, root, tip], loads: vec![], closures: vec![] }.build().unwrap()
 }
 
 #[test]
@@ -169,7 +169,7 @@ fn coupled(frequency_hz: Vec<f64>, coupling: f64, damping_ratio: f64) -> (System
     }
     let mut base = hinge("base", "revolute", &[Z], WORLD, "body", [0.0; 3]);
     base.torque = Some(TimeFunction::Constant(vec![1.0]));
-    Definition { gravity: Vector3::zeros(), bodies: vec![body], hinges: vec![base], loads: vec![] }.build().unwrap()
+    Definition { gravity: Vector3::zeros(), bodies: vec![body], hinges: vec![base], loads: vec![], closures: vec![] }.build().unwrap()
 }
 
 /// S10: closed form; ten modes, each displaced by the same elastic force, so that theta'' = (1 + 0.01 delta) / J_eff.
