@@ -114,7 +114,8 @@ fn steps_and_time_per_step_do_not_grow_with_the_fastest_mode() {
         for hz in [30.0, 3e3, 3e5] {
             let stiff = run_with(hz);
             assert!(stiff.0 <= 1.1 * slow.0, "{tolerance:e}, {hz} Hz: {} steps, {} at 3 Hz", stiff.0, slow.0);
-            assert!(stiff.1 <= 1.5 * slow.1, "{tolerance:e}, {hz} Hz: {:e} s per step, {:e} at 3 Hz", stiff.1, slow.1);
+            // a step that resolved the mode would cost 10 to 100,000 times as much; 2.5 leaves room for a busy machine
+            assert!(stiff.1 <= 2.5 * slow.1, "{tolerance:e}, {hz} Hz: {:e} s per step, {:e} at 3 Hz", stiff.1, slow.1);
         }
     }
 }
