@@ -31,7 +31,7 @@ impl Failure {
             Self::Input(messages) => (messages.clone(), INPUT),
             Self::Stopped(message) => (vec![message.clone()], STOPPED),
             Self::Output(error) if error.kind() == ErrorKind::BrokenPipe => return ExitCode::SUCCESS,
-            Self::Output(error) => (vec![format!("cannot write the output: {error}")], 1),
+            Self::Output(error) => (vec![format!("cannot write the output: {error}")], STOPPED),
         };
         let mut sink = io::stderr().lock();
         for message in messages {

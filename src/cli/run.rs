@@ -4,6 +4,7 @@ use super::args::{RunArguments, Viewer};
 use super::failure::{Failure, with_causes};
 use super::report::number;
 use super::run_report;
+use crate::dynamics::{Workspace, forward_dynamics};
 use crate::integrate::simulate::Method;
 use crate::integrate::stability::fastest_mode;
 use crate::integrate::{Flow, Observer, Outcome, Sample, Settings, simulate};
@@ -25,6 +26,9 @@ const EXAMPLE: [(&str, &[u8]); 2] = [
 /// Simulates the scene and prints the closing report.
 pub fn run(arguments: &RunArguments, output: &mut dyn Write) -> Result<(), Failure> {
     let mut overrides = Overrides::from(&arguments.overrides);
+    if let Some(duration) = arguments.duration.filter(|d| !(*d > 0.0 && d.is_finite())) {
+        return Err(Failure::input(format!("--duration {duration} must be a positive number of seconds")));
+    }
     overrides.duration = arguments.duration;
     // the folder must live as long as the modal files in it are read
     let (scene, _folder) = match &arguments.scene {
@@ -36,14 +40,24 @@ pub fn run(arguments: &RunArguments, output: &mut dyn Write) -> Result<(), Failu
         return Err(Failure::input(format!("{}: {message}", scene.source.path.display())));
     };
     let viewer = arguments.viewer.unwrap_or(if arguments.rrd.is_some() || arguments.scene.is_none() { Viewer::Save } else { Viewer::None });
+    if arguments.rrd.is_some() && viewer != Viewer::Save {
+        return Err(Failure::input("--rrd goes with --viewer save only; leave one of them out"));
+    }
     let settings = Settings { duration, method: scene.method, rate_hz: scene.rate_hz };
+    check_output_count(&scene, duration)?;
+    check_targets(arguments, &scene)?;
+    let not_unique = not_unique(&scene)?;
 
     let plan = plan(&scene, viewer != Viewer::None)?;
     let mut outputs = OutputSet::new(&scene.system, plan).map_err(|e| Failure::input(with_causes(&e)))?;
-    open_results(arguments, &mut outputs)?;
+    // a viewer that cannot be reached must not cost the results of an earlier run
     open_viewer(arguments, viewer, &scene, &mut outputs)?;
+    open_results(arguments, &mut outputs)?;
     let left_out = left_out(arguments, viewer, &scene);
     announce(&scene, &settings, &left_out);
+    if let Some(warning) = not_unique {
+        let _ = writeln!(std::io::stderr(), "{warning}");
+    }
 
     let mut progress = Progress::new(&settings);
     let started = Instant::now();
@@ -73,6 +87,48 @@ pub fn run(arguments: &RunArguments, output: &mut dyn Write) -> Result<(), Failu
     let problems: Vec<_> =
         report.files.iter().filter_map(|f| f.problem.as_ref().map(|p| format!("{} {}: {p}", f.kind, f.target))).collect();
     if problems.is_empty() { Ok(()) } else { Err(Failure::Stopped(problems.join("\nerror: "))) }
+}
+
+/// Most output times of a run; each is held against the limits, written and drawn.
+const MOST_OUTPUTS: f64 = 1e7;
+
+fn check_output_count(scene: &Scene, duration: f64) -> Result<(), Failure> {
+    let count = scene.rate_hz * duration;
+    if count <= MOST_OUTPUTS {
+        return Ok(());
+    }
+    Err(Failure::input(format!(
+        "{}: output.rate_hz = {:e} for {duration} s makes {count:e} output times, more than {MOST_OUTPUTS:e}; lower rate_hz",
+        scene.source.path.display(),
+        scene.rate_hz
+    )))
+}
+
+/// Refuses to write over the scene, its modal files, or one output over the other.
+fn check_targets(arguments: &RunArguments, scene: &Scene) -> Result<(), Failure> {
+    let real = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    let mut inputs = vec![real(&scene.source.path)];
+    #[cfg(feature = "hdf5")]
+    inputs.extend(scene.flexible.iter().map(|(_, selection)| real(selection.file.path())));
+    for (option, target) in [("--out", &arguments.out), ("--rrd", &arguments.rrd)] {
+        if let Some(target) = target.as_ref().filter(|t| inputs.contains(&real(t))) {
+            return Err(Failure::input(format!("{option} {} is an input of this run; write to another file", target.display())));
+        }
+    }
+    match (&arguments.out, &arguments.rrd) {
+        (Some(out), Some(rrd)) if real(out) == real(rrd) => {
+            Err(Failure::input(format!("--out and --rrd both name {}; give each its own file", out.display())))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Evaluates the start, where a scene that has no answer is at fault, and says which closure loads are not unique.
+fn not_unique(scene: &Scene) -> Result<Option<String>, Failure> {
+    let mut workspace = Workspace::new(&scene.system);
+    forward_dynamics(&scene.system, &scene.state, &mut workspace)
+        .map_err(|e| Failure::input(format!("{}: at the start: {}", scene.source.path.display(), with_causes(&e))))?;
+    Ok(workspace.redundancy_warning(&scene.system))
 }
 
 /// Unpacks the example into a folder of its own.

@@ -29,7 +29,7 @@ pub fn write(scene: &str, report: &RunReport, output: &mut dyn Write) -> Result<
     for (name, peak) in report.peaks.hinges.iter() {
         hinges.row([name.to_owned(), number(peak.moment), number(peak.moment_time_s), number(peak.force), number(peak.force_time_s)]);
     }
-    writeln!(output, "\npeak hinge loads, by the parent on the child, moment about O:")?;
+    writeln!(output, "\npeak hinge loads over the output times, by the parent on the child, moment about O:")?;
     hinges.write(output)?;
     if !report.peaks.bodies.0.is_empty() {
         let mut bodies = Table::new(&[

@@ -124,6 +124,8 @@ pub struct NewtonEuler {
     load: Vec<Vector6<f64>>,
     /// Rigid rows of `M alpha + b - external` at B in body axes.
     pub inertial: Vec<Vector6<f64>>,
+    /// Largest moment and force among the terms of `inertial`, which may cancel in the sum.
+    magnitude: Vec<[f64; 2]>,
     modal: Vec<f64>,
     b_modal: Vec<f64>,
     elastic: Vec<f64>,
@@ -147,6 +149,7 @@ impl NewtonEuler {
             hinge: vec![rest; count],
             load: vec![Vector6::zeros(); count],
             inertial: vec![Vector6::zeros(); count],
+            magnitude: vec![[0.0; 2]; count],
             modal: vec![0.0; system.modal_count],
             b_modal: vec![0.0; system.modal_count],
             elastic: vec![0.0; system.modal_count],
@@ -224,17 +227,28 @@ impl NewtonEuler {
         let alpha = spatial(&spin, &acceleration);
         let external = force.external.get(k).copied().unwrap_or_default();
         let range = body.modal_range();
+        let mut magnitude = [0.0_f64; 2];
+        let mut note = |f: &Vector6<f64>| {
+            magnitude[0] = magnitude[0].max(angular(f).amax());
+            magnitude[1] = magnitude[1].max(linear(f).amax());
+        };
+        note(&external);
         self.inertial[k] = match (&body.kind, pose.bodies[k].flexible) {
             (BodyKind::Flexible(flexible), Some(index)) => {
                 let inertia: &flexible_inertia::FlexibleInertia = &pose.flexible[index].inertia;
                 let (eta, eta_dot) = (&state.modal_position[range.clone()], &state.modal_velocity[range.clone()]);
                 let b_modal = &mut self.b_modal[range.clone()];
-                let mut f =
-                    inertia.rigid.times(&alpha) + inertia.velocity_terms(&flexible.integrals, flexible.order, &omega, eta_dot, b_modal);
+                let b = inertia.velocity_terms(&flexible.integrals, flexible.order, &omega, eta_dot, b_modal);
+                let mut f = inertia.rigid.times(&alpha);
+                note(&f);
+                note(&b);
+                f += b;
                 let elastic = &mut self.elastic[range.clone()];
                 flexible.elastic_force(eta, eta_dot, elastic);
                 for (j, m) in range.enumerate() {
-                    f += inertia.row[j] * modal_acceleration[m];
+                    let of_mode = inertia.row[j] * modal_acceleration[m];
+                    note(&of_mode);
+                    f += of_mode;
                     let outside = force.external_modal.get(m).copied().unwrap_or(0.0);
                     self.modal[m] = modal_acceleration[m] + inertia.row[j].dot(&alpha) + self.b_modal[m] + self.elastic[m] - outside;
                 }
@@ -242,12 +256,15 @@ impl NewtonEuler {
             }
             (BodyKind::Rigid(inertia), _) => {
                 let c = inertia.first_moment();
-                let moment = inertia.rotational * spin + c.cross(&acceleration) + omega.cross(&(inertia.rotational * omega));
-                let push = acceleration * inertia.translational[(0, 0)] + spin.cross(&c) + omega.cross(&omega.cross(&c));
-                spatial(&moment, &push) - external
+                let of_spin = spatial(&(inertia.rotational * spin), &spin.cross(&c));
+                let of_acceleration = spatial(&c.cross(&acceleration), &(acceleration * inertia.translational[(0, 0)]));
+                let of_rates = spatial(&omega.cross(&(inertia.rotational * omega)), &omega.cross(&omega.cross(&c)));
+                [of_spin, of_acceleration, of_rates].iter().for_each(&mut note);
+                of_spin + of_acceleration + of_rates - external
             }
             (BodyKind::Flexible(_), None) => Vector6::zeros(),
         };
+        self.magnitude[k] = magnitude;
     }
 
     /// Load at the hinge of body `k` by the parent on the child, about O, in O axes.
@@ -316,12 +333,11 @@ impl NewtonEuler {
         let (mut difference, mut size) = ([0.0_f64; 2], [0.0_f64; 2]);
         for k in 0..system.bodies.len() {
             let (mine, theirs) = (self.hinge_load(k), hinge_load(workspace, k));
-            let felt = self.inertial[k];
             for part in 0..2 {
                 let rows = |x: &Vector6<f64>| x.fixed_rows::<3>(3 * part).amax();
                 difference[part] = difference[part].max(rows(&(mine - theirs)));
-                // a free body has no load to compare with: its inertial force sets the scale
-                size[part] = size[part].max(rows(&mine)).max(rows(&felt));
+                // a free body has no load to compare with: the forces that cancel in it set the scale
+                size[part] = size[part].max(rows(&mine)).max(self.magnitude[k][part]);
             }
             size[0] = size[0].max(self.turning_moment(system, workspace, k));
         }

@@ -154,6 +154,19 @@ impl Workspace {
             closed: ClosedChain::new(system),
         }
     }
+
+    /// What to say of loads that the last evaluation could not determine: redundant closures share them by least norm.
+    #[must_use]
+    pub fn redundancy_warning(&self, system: &System) -> Option<String> {
+        let report = self.closed.as_ref()?.rank_report(system);
+        let redundant = report.rows.checked_sub(report.rank).filter(|n| *n > 0)?;
+        Some(format!(
+            "warning: {redundant} of {} closed directions are redundant ({}); how the loads divide over their loops is not determined, those reported have \
+             the least multipliers",
+            report.rows,
+            report.redundant.join(", ")
+        ))
+    }
 }
 
 /// Accelerations of all hinge and modal coordinates at `state`, left in `workspace.acceleration`.

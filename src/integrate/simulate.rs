@@ -385,6 +385,14 @@ impl Run<'_, '_> {
             }
             forward_dynamics(self.chart.system, &self.sampled, &mut self.output)
                 .map_err(|source| RunFailure::Dynamics { time: at, source })?;
+            if !is_finite(&self.output) {
+                let place = fastest_place(self.chart);
+                return Err(RunFailure::NotFinite {
+                    time: at,
+                    place,
+                    remedy: "take a smaller step, fewer modes or an error-controlled integrator",
+                });
+            }
             let sample = Sample { system: self.chart.system, state: &self.sampled, workspace: &self.output, work, steps: self.steps };
             for observer in observers.iter_mut() {
                 if observer.observe(&sample) == Flow::Stop {
@@ -418,6 +426,13 @@ fn is_torn_apart(chart: &Chart<'_>) -> bool {
         }
         _ => false,
     })
+}
+
+/// True if the accelerations of an evaluation, and so its loads, are finite.
+fn is_finite(workspace: &Workspace) -> bool {
+    let acceleration = &workspace.acceleration;
+    let numbers = acceleration.hinge.iter().chain(&acceleration.modal);
+    numbers.chain(acceleration.alpha_plus.iter().flatten()).all(|x| x.is_finite())
 }
 
 /// The hinge or mode that moves fastest, for messages.

@@ -33,7 +33,7 @@ pub enum TimeFunction {
     Sum(Vec<TimeFunction>),
 }
 
-/// Values at ascending times: straight lines between them, or the natural cubic spline through them.
+/// Values at ascending times: straight lines between them, or the cubic spline through them that rests at both ends.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table {
     times: Vec<f64>,
@@ -92,29 +92,32 @@ impl Table {
         Ok(Self { times, values, curvatures: Vec::new(), dimension })
     }
 
-    /// The same table with the natural cubic spline through its values, for motions that need two derivatives.
+    /// The same table with the cubic spline through its values that rests at both ends, for motions that need two derivatives.
+    ///
+    /// The end values hold outside the table, so that any other end slope would be a jump in rate, which no hinge can follow.
     #[must_use]
     pub fn splined(mut self) -> Self {
         let (n, d) = (self.times.len(), self.dimension);
         self.curvatures = vec![0.0; n * d];
-        if n < 3 {
+        if n < 2 {
             return self;
         }
-        // tridiagonal system for the inner curvatures, by elimination down and substitution up (diagonally dominant)
+        // tridiagonal system for the curvatures, by elimination down and substitution up (diagonally dominant)
         let step = |i: usize| self.times[i + 1] - self.times[i];
         for c in 0..d {
-            let value = |i: usize| self.values[i * d + c];
+            let slope = |i: usize| (self.values[(i + 1) * d + c] - self.values[i * d + c]) / step(i);
             let mut pivot = vec![0.0; n];
             let mut right = vec![0.0; n];
-            for i in 1..n - 1 {
-                let (below, above) = (step(i - 1), step(i));
-                let carried = if i > 1 { below / pivot[i - 1] } else { 0.0 };
+            for i in 0..n {
+                let (below, before) = if i > 0 { (step(i - 1), slope(i - 1)) } else { (0.0, 0.0) };
+                let (above, after) = if i + 1 < n { (step(i), slope(i)) } else { (0.0, 0.0) };
+                let carried = if i > 0 { below / pivot[i - 1] } else { 0.0 };
                 pivot[i] = 2.0 * (below + above) - carried * below;
-                right[i] = 6.0 * ((value(i + 1) - value(i)) / above - (value(i) - value(i - 1)) / below) - carried * right[i - 1];
+                right[i] = 6.0 * (after - before) - if i > 0 { carried * right[i - 1] } else { 0.0 };
             }
-            for i in (1..n - 1).rev() {
-                let next = if i + 1 < n - 1 { self.curvatures[(i + 1) * d + c] } else { 0.0 };
-                self.curvatures[i * d + c] = (right[i] - step(i) * next) / pivot[i];
+            for i in (0..n).rev() {
+                let above = if i + 1 < n { step(i) * self.curvatures[(i + 1) * d + c] } else { 0.0 };
+                self.curvatures[i * d + c] = (right[i] - above) / pivot[i];
             }
         }
         self
@@ -250,13 +253,18 @@ mod tests {
     }
 
     #[test]
-    fn a_spline_passes_through_its_table_and_reproduces_a_line() {
-        let rows: Vec<_> = [0.0, 1.0, 3.0, 4.0].iter().map(|&t| (t, vec![2.0 * t - 1.0])).collect();
+    fn a_spline_passes_through_its_table_and_rests_at_both_ends() {
+        // a cubic that rests at both ends is its own spline, whatever the knots
+        let cubic = |t: f64| 3.0 * t * t - 2.0 * t * t * t;
+        let rows: Vec<_> = [0.0, 0.2, 0.7, 1.0].iter().map(|&t| (t, vec![cubic(t)])).collect();
         let f = TimeFunction::Table(Table::new(&rows).unwrap().splined());
-        for t in [0.5, 1.0, 2.2, 3.9] {
-            assert!((f.value(t, 0) - (2.0 * t - 1.0)).abs() < 1e-14);
+        for t in [0.0, 0.1, 0.2, 0.55, 0.9, 1.0] {
+            assert!((f.value(t, 0) - cubic(t)).abs() < 1e-14);
         }
-        assert_eq!(f.sample(9.0, 0), [7.0, 0.0, 0.0]);
+        assert!(f.sample(1e-9, 0)[1].abs() < 1e-8 && f.sample(1.0 - 1e-9, 0)[1].abs() < 1e-8);
+        assert_eq!(f.sample(9.0, 0), [1.0, 0.0, 0.0]);
+        let two = TimeFunction::Table(Table::new(&[(0.0, vec![0.0]), (1.0, vec![1.0])]).unwrap().splined());
+        assert!((two.value(0.3, 0) - cubic(0.3)).abs() < 1e-15);
     }
 
     #[test]

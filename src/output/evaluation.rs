@@ -179,6 +179,16 @@ impl Evaluation {
         }
     }
 
+    /// True if accelerations, loads and energies are finite.
+    #[must_use]
+    pub fn is_finite(&self) -> bool {
+        let of_hinge = |h: &HingeEvaluation| h.acceleration.iter().chain(&h.load.moment).chain(&h.load.force).all(|x| x.is_finite());
+        let energy = [self.energy.kinetic, self.energy.strain, self.energy.potential];
+        self.hinges.iter().all(|(_, h)| of_hinge(h))
+            && self.bodies.iter().all(|(_, b)| b.modal_acceleration.iter().all(|x| x.is_finite()))
+            && energy.iter().all(|x| x.is_finite())
+    }
+
     /// Evaluates the dynamics at `state`, whose prescribed hinges must stand at their functions' values, and records the result.
     ///
     /// # Errors
