@@ -218,7 +218,8 @@ fn stream_results_and_report_say_the_same() -> Tested {
 
     let peak = report.peaks.hinges.get("left/drive").ok_or("no peak")?;
     let largest = moments.rows().into_iter().map(|r| r.iter().map(|x| x * x).sum::<f64>().sqrt()).fold(0.0, f64::max);
-    assert!((peak.moment - largest).abs() < 1e-12 * largest);
+    // the report looks at every step as well: no less than the file, and hardly more at this rate of output
+    assert!(largest <= peak.moment * (1.0 + 1e-12) && peak.moment < 1.02 * largest, "{} {largest}", peak.moment);
     assert!(largest > MOMENT_LIMIT && !report.exceedances.is_empty());
     let exceeded: Vec<_> = logged.texts["/events"].iter().filter(|t| t.contains("above its limit")).collect();
     assert_eq!(exceeded.len(), report.exceedances.len());

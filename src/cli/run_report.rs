@@ -29,7 +29,7 @@ pub fn write(scene: &str, report: &RunReport, output: &mut dyn Write) -> Result<
     for (name, peak) in report.peaks.hinges.iter() {
         hinges.row([name.to_owned(), number(peak.moment), number(peak.moment_time_s), number(peak.force), number(peak.force_time_s)]);
     }
-    writeln!(output, "\npeak hinge loads over the output times, by the parent on the child, moment about O:")?;
+    writeln!(output, "\npeak hinge loads over all steps, by the parent on the child, moment about O:")?;
     hinges.write(output)?;
     if !report.peaks.bodies.0.is_empty() {
         let mut bodies = Table::new(&[
@@ -43,7 +43,7 @@ pub fn write(scene: &str, report: &RunReport, output: &mut dyn Write) -> Result<
             let place = peak.position.map(number).join(", ");
             bodies.row([name.to_owned(), number(peak.von_mises), number(peak.time_s), peak.node.to_string(), place]);
         }
-        writeln!(output, "\npeak stress:")?;
+        writeln!(output, "\npeak stress over the output times:")?;
         bodies.write(output)?;
     }
     if !report.exceedances.is_empty() {

@@ -31,4 +31,7 @@ pub enum Flow {
 pub trait Observer {
     /// Called at every output time, in order.
     fn observe(&mut self, sample: &Sample<'_>) -> Flow;
+
+    /// Called at the end of every accepted step, after the output times within it; the evaluation there costs nothing extra.
+    fn step(&mut self, _step: &Sample<'_>) {}
 }

@@ -257,6 +257,10 @@ impl Run<'_, '_> {
                     if !self.chart.system.closures.is_empty() {
                         self.hold_closures(stepper)?;
                     }
+                    let chart = &*self.chart;
+                    let (state, workspace) = (&chart.base, &chart.workspace);
+                    let step = Sample { system: chart.system, state, workspace, work: chart.work, steps: self.steps };
+                    observers.iter_mut().for_each(|o| o.step(&step));
                     flow
                 });
                 match done {

@@ -19,7 +19,7 @@ pub struct ErrorFigures {
     pub local: Option<f64>,
 }
 
-/// Largest load magnitudes at one hinge over the output times.
+/// Largest load magnitudes at one hinge over all steps and output times.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct HingePeak {
     /// N m.
@@ -71,9 +71,9 @@ pub struct Exceedance {
     pub limit: f64,
     /// Largest value of this stay.
     pub peak: f64,
-    /// First output time above the limit (s).
+    /// First time above the limit: an output time, for hinge loads also the end of a step (s).
     pub start_s: f64,
-    /// First output time back at or below it; none if the run ended above (s).
+    /// First such time back at or below it; none if the run ended above (s).
     pub end_s: Option<f64>,
 }
 

@@ -146,6 +146,10 @@ impl<'s> OutputSet<'s> {
 }
 
 impl Observer for OutputSet<'_> {
+    fn step(&mut self, step: &Sample<'_>) {
+        self.tracker.follow_step(step);
+    }
+
     fn observe(&mut self, sample: &Sample<'_>) -> Flow {
         self.evaluator.evaluate(&self.plan, sample);
         let frame = &self.evaluator.frame;

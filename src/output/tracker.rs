@@ -1,4 +1,4 @@
-//! Peaks, limits and error figures, followed over the output times.
+//! Peaks, limits and error figures, followed over the output times; hinge loads over the ends of the steps as well.
 
 use super::evaluation::Named;
 use super::frame::OutputFrame;
@@ -6,9 +6,11 @@ use super::plan::OutputPlan;
 use super::report::{BodyPeak, ErrorFigures, Exceedance, HingePeak, Peaks};
 use super::scales::plain;
 use crate::dynamics::energy::Momentum;
+use crate::dynamics::hinge_load::hinge_load;
 use crate::integrate::Sample;
 use crate::model::{ClosureJoint, HingeKind, System};
 use crate::spatial::shift::{angular, linear};
+use nalgebra::Vector6;
 
 /// Something an output time made known.
 #[derive(Debug, Clone, PartialEq)]
@@ -55,6 +57,15 @@ enum Source {
 }
 
 impl Source {
+    /// The value where only hinge loads are known.
+    fn of_load(self, loads: &[Vector6<f64>]) -> Option<f64> {
+        match self {
+            Self::Moment(i) => Some(angular(&loads[i]).norm()),
+            Self::Force(i) => Some(linear(&loads[i]).norm()),
+            Self::Stress(_) => None,
+        }
+    }
+
     fn value(self, frame: &OutputFrame) -> f64 {
         match self {
             Self::Moment(i) => angular(&frame.loads[i]).norm(),
@@ -64,15 +75,33 @@ impl Source {
     }
 }
 
-/// Follows a run over its output times.
+/// Raises the peaks of hinges to the magnitudes of `loads` at `time`.
+fn raise_peaks(hinges: &mut [(String, HingePeak)], loads: &[Vector6<f64>], time: f64) {
+    for ((_, peak), load) in hinges.iter_mut().zip(loads) {
+        let (moment, force) = (angular(load).norm(), linear(load).norm());
+        if moment > peak.moment {
+            (peak.moment, peak.moment_time_s) = (moment, time);
+        }
+        if force > peak.force {
+            (peak.force, peak.force_time_s) = (force, time);
+        }
+        peak.time_s = if peak.moment > 0.0 { peak.moment_time_s } else { peak.force_time_s };
+    }
+}
+
+/// Follows a run over its output times, hinge loads over its steps as well.
 #[derive(Debug, Clone)]
 pub struct Tracker {
     hinges: Vec<(String, HingePeak)>,
+    /// Bodies that the hinges carry, in the same order, and their loads at the last step.
+    loaded: Vec<usize>,
+    loads: Vec<Vector6<f64>>,
     bodies: Vec<(usize, String, BodyPeak)>,
     watches: Vec<Watch>,
     exceedances: Vec<Exceedance>,
-    /// Events of the last output time.
+    /// Events of the last output time and of the steps since the one before.
     pub events: Vec<Event>,
+    since: Vec<Event>,
     start: Option<Start>,
     isolated: bool,
     total_mass: f64,
@@ -117,10 +146,13 @@ impl Tracker {
         }
         Self {
             hinges,
+            loads: vec![Vector6::zeros(); loaded.len()],
+            loaded,
             bodies,
             watches,
             exceedances: Vec::new(),
             events: Vec::new(),
+            since: Vec::new(),
             start: None,
             isolated: is_isolated(system),
             total_mass: system.bodies.iter().map(crate::model::Body::mass).sum(),
@@ -138,16 +170,7 @@ impl Tracker {
     /// Takes in one output time.
     pub fn follow(&mut self, plan: &OutputPlan, sample: &Sample<'_>, frame: &OutputFrame) {
         let time = sample.state.time;
-        for ((_, peak), load) in self.hinges.iter_mut().zip(&frame.loads) {
-            let (moment, force) = (angular(load).norm(), linear(load).norm());
-            if moment > peak.moment {
-                (peak.moment, peak.moment_time_s) = (moment, time);
-            }
-            if force > peak.force {
-                (peak.force, peak.force_time_s) = (force, time);
-            }
-            peak.time_s = if peak.moment > 0.0 { peak.moment_time_s } else { peak.force_time_s };
-        }
+        raise_peaks(&mut self.hinges, &frame.loads, time);
         for (index, _, peak) in &mut self.bodies {
             let found = frame.stress[*index];
             if found.value > peak.von_mises {
@@ -155,7 +178,9 @@ impl Tracker {
                 *peak = BodyPeak { von_mises: found.value, time_s: time, node: found.node, position };
             }
         }
-        self.watch_limits(time, frame);
+        self.watch_limits(time, |source| Some(source.value(frame)));
+        self.events.clear();
+        self.events.append(&mut self.since);
         self.follow_balances(sample, frame);
         if let Some(audit) = frame.audit {
             self.audit = Some(self.audit.unwrap_or(0.0).max(audit.load));
@@ -165,23 +190,35 @@ impl Tracker {
         }
     }
 
-    fn watch_limits(&mut self, time: f64, frame: &OutputFrame) {
-        self.events.clear();
+    /// Takes in the end of a step: loads peak between output times too.
+    pub fn follow_step(&mut self, step: &Sample<'_>) {
+        let time = step.state.time;
+        for (load, &k) in self.loads.iter_mut().zip(&self.loaded) {
+            *load = hinge_load(step.workspace, k);
+        }
+        raise_peaks(&mut self.hinges, &self.loads, time);
+        let loads = std::mem::take(&mut self.loads);
+        self.watch_limits(time, |source| source.of_load(&loads));
+        self.loads = loads;
+    }
+
+    /// Holds the quantities that `value` knows against their limits.
+    fn watch_limits(&mut self, time: f64, value: impl Fn(&Source) -> Option<f64>) {
         for watch in &mut self.watches {
-            let value = watch.source.value(frame);
+            let Some(value) = value(&watch.source) else { continue };
             match watch.open {
                 None if value > watch.limit => {
                     let Watch { kind, quantity, unit, limit, .. } = *watch;
                     let stay =
                         Exceedance { kind, name: watch.name.clone(), quantity, unit, limit, peak: value, start_s: time, end_s: None };
-                    self.events.push(Event::Exceeded(stay.clone()));
+                    self.since.push(Event::Exceeded(stay.clone()));
                     watch.open = Some(self.exceedances.len());
                     self.exceedances.push(stay);
                 }
                 Some(open) if value > watch.limit => self.exceedances[open].peak = self.exceedances[open].peak.max(value),
                 Some(open) => {
                     self.exceedances[open].end_s = Some(time);
-                    self.events.push(Event::Recovered(self.exceedances[open].clone()));
+                    self.since.push(Event::Recovered(self.exceedances[open].clone()));
                     watch.open = None;
                 }
                 None => {}

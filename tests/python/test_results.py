@@ -32,13 +32,15 @@ def test_a_results_file_holds_histories_with_unit_frame_point_and_side(run):
     assert "drive_left" in attributes["frame"]
 
 
-def test_peaks_of_the_report_are_those_of_the_histories(run):
+def test_peaks_of_the_report_bound_those_of_the_histories(run):
     path, report = run
     with h5py.File(path) as file:
         for hinge in ("drive_left", "drive_right"):
             peak = np.linalg.norm(file[f"hinges/{hinge}/load_moment"][:], axis=1).max()
-            # the report takes its peaks at the same output times: equal to rounding of a norm
-            assert abs(peak / report["peaks"]["hinges"][hinge]["moment"] - 1) < 4 * np.finfo(float).eps
+            reported = report["peaks"]["hinges"][hinge]["moment"]
+            # the report also looks at every step: between 30 output times a second the fastest ripple, 1.8 Hz of a tenth of the
+            # load, hides at most a tenth of (pi 1.8 / 30)^2 / 2
+            assert peak <= reported * (1 + 4 * np.finfo(float).eps) and reported < peak * 1.002
 
 
 def test_a_results_file_holds_its_scene_and_the_digests_of_its_modal_files(run):
