@@ -12,7 +12,9 @@ use crate::output::{OutputPlan, OutputSet};
 use crate::scene::{Overrides, Scene, SceneError, assemble};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::Path;
+#[cfg(feature = "rerun")]
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
@@ -107,9 +109,10 @@ fn check_output_count(scene: &Scene, duration: f64) -> Result<(), Failure> {
 /// Refuses to write over the scene, its modal files, or one output over the other.
 fn check_targets(arguments: &RunArguments, scene: &Scene) -> Result<(), Failure> {
     let real = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_owned());
-    let mut inputs = vec![real(&scene.source.path)];
+    let inputs = std::iter::once(real(&scene.source.path));
     #[cfg(feature = "hdf5")]
-    inputs.extend(scene.flexible.iter().map(|(_, selection)| real(selection.file.path())));
+    let inputs = inputs.chain(scene.flexible.iter().map(|(_, selection)| real(selection.file.path())));
+    let inputs: Vec<_> = inputs.collect();
     for (option, target) in [("--out", &arguments.out), ("--rrd", &arguments.rrd)] {
         if let Some(target) = target.as_ref().filter(|t| inputs.contains(&real(t))) {
             return Err(Failure::input(format!("{option} {} is an input of this run; write to another file", target.display())));
@@ -207,7 +210,6 @@ fn open_viewer(arguments: &RunArguments, viewer: Viewer, scene: &Scene, outputs:
 #[cfg(not(feature = "rerun"))]
 fn open_viewer(arguments: &RunArguments, viewer: Viewer, _scene: &Scene, _outputs: &mut OutputSet<'_>) -> Result<(), Failure> {
     // the example runs without a picture where there is none to be had
-    let _: Option<PathBuf> = None;
     match arguments.viewer.or(arguments.rrd.as_ref().map(|_| viewer)) {
         None | Some(Viewer::None) => Ok(()),
         Some(_) => Err(Failure::input("--viewer: this build has no viewer stream; build with the feature \"rerun\"")),

@@ -27,7 +27,7 @@
 
 use super::Stepper;
 use super::chart::Chart;
-use super::runge_kutta::combine;
+use super::runge_kutta::{combine, hermite};
 use super::step_control::{Tolerance, error_norm};
 use super::w_tableau::{STAGES, WTableau};
 use crate::dynamics::DynamicsError;
@@ -187,10 +187,7 @@ impl RosenbrockW {
 
     /// y at the fraction `theta` of the step, entry by entry: the cubic Hermite interpolant.
     fn dense(&self, theta: f64, i: usize) -> f64 {
-        let change = self.y1[i] - self.y0[i];
-        let begin = self.h * self.f0[i] - change;
-        let close = change - self.h * self.f1[i] - begin;
-        self.y0[i] + theta * (change + (1.0 - theta) * (begin + theta * close))
+        hermite(theta, self.h, [self.y0[i], self.y1[i]], [self.f0[i], self.f1[i]], 0.0)
     }
 }
 

@@ -43,14 +43,19 @@ impl RungeKutta {
     /// y at the fraction `theta` of the step, entry by entry.
     fn dense(&self, theta: f64, i: usize) -> f64 {
         let last = self.k.len() - 1;
-        let rest = 1.0 - theta;
-        let change = self.y1[i] - self.y0[i];
-        // cubic Hermite interpolant, then the method's own quintic term
-        let begin = self.h * self.k[0][i] - change;
-        let close = change - self.h * self.k[last][i] - begin;
-        let extra: f64 = self.tableau.dense.iter().zip(&self.k).map(|(d, k)| d * k[i]).sum::<f64>() * self.h;
-        self.y0[i] + theta * (change + rest * (begin + theta * (close + rest * extra)))
+        let quintic = self.tableau.dense.iter().zip(&self.k).map(|(d, k)| d * k[i]).sum::<f64>() * self.h;
+        hermite(theta, self.h, [self.y0[i], self.y1[i]], [self.k[0][i], self.k[last][i]], quintic)
     }
+}
+
+/// Cubic Hermite interpolant of the values `y` and rates `f` at both ends of a step of `h`, at its fraction `theta`, and a method's own
+/// `quintic` term, which vanishes with its slope at both ends.
+pub(super) fn hermite(theta: f64, h: f64, y: [f64; 2], f: [f64; 2], quintic: f64) -> f64 {
+    let rest = 1.0 - theta;
+    let change = y[1] - y[0];
+    let begin = h * f[0] - change;
+    let close = change - h * f[1] - begin;
+    y[0] + theta * (change + rest * (begin + theta * (close + rest * quintic)))
 }
 
 /// `out = y0 + h sum_j weights_j k_j`.

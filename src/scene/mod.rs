@@ -3,6 +3,8 @@
 pub mod assemble;
 pub mod closures;
 pub mod error;
+#[cfg(feature = "hdf5")]
+mod flexible;
 mod functions;
 mod locate;
 #[cfg(feature = "hdf5")]

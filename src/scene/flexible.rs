@@ -1,0 +1,117 @@
+//! Flexible bodies of a scene: modal file, retained modes, damping, and mesh nodes that carry loads.
+
+use super::assemble::Assembly;
+use super::error::{SceneError, Source};
+use super::locate::Step;
+use super::modal_files::Selection;
+use super::spec::{BodySpec, ModesRule, ModesSpec, Numbers};
+use crate::model::InertiaOrder;
+use crate::model::build::{BodyDefinitionKind, FlexibleDefinition, PointDefinition};
+use nalgebra::{Vector3, Vector6};
+use std::path::Path;
+
+impl Assembly<'_> {
+    pub(super) fn flexible(&mut self, index: usize, body: &BodySpec, file: &Path) -> Result<BodyDefinitionKind, SceneError> {
+        let steps = [Step::Key("body"), Step::Index(index), Step::Key("modal_file")];
+        let path = self.source.path.parent().unwrap_or(Path::new("")).join(file);
+        let (handle, full, content_sha256) = self.files.open(&path, self.source, &steps)?;
+        let modes = retained(self, index, body, &full.frequency_hz)?;
+        if modes.len() < full.mode_count() {
+            self.left_out.push(format!("{} of {} modes of \"{}\"", full.mode_count() - modes.len(), full.mode_count(), body.name));
+        }
+        if full.geometric_stiffness.is_some() && !self.left_out.iter().any(|l| l.starts_with("geometric stiffness")) {
+            self.left_out.push("geometric stiffness (in the modal files, not used by this version)".into());
+        }
+        let (modal, integrals) = self.files.pack(&path, &full, &modes);
+        let damping_ratio = match &body.damping_ratio {
+            None => modal.damping_ratio.clone(),
+            Some(Numbers::One(z)) => vec![*z; modes.len()],
+            // a list for the scene's own choice of modes still fits when an override retains fewer
+            Some(Numbers::Many(list)) if self.overrides.modes.is_some() || modes.is_empty() => {
+                list.iter().copied().take(modes.len()).collect()
+            }
+            Some(Numbers::Many(list)) => list.clone(),
+        };
+        let start =
+            |given: &[f64]| if self.is_overridden(body) { given.iter().copied().take(modes.len()).collect() } else { given.to_vec() };
+        let definition = FlexibleDefinition {
+            damping_ratio,
+            order: inertia_order(self.source, index, body)?,
+            modal_position: start(&body.modal_position),
+            modal_velocity: start(&body.modal_velocity),
+            mode_numbers: modes.iter().map(|m| m + 1).collect(),
+            modal,
+            integrals,
+        };
+        self.chosen.push((index, Selection { file: handle, modes, content_sha256 }));
+        Ok(BodyDefinitionKind::Flexible(definition))
+    }
+
+    fn is_overridden(&self, body: &BodySpec) -> bool {
+        self.overrides.modes.is_some() || self.overrides.rigid.contains(&body.name)
+    }
+
+    pub(super) fn mesh_node(&self, index: usize, node: usize, number: Option<usize>) -> Result<PointDefinition, SceneError> {
+        let steps = [Step::Key("load"), Step::Index(index), Step::Key("mesh_node")];
+        let Some((_, selection)) = self.chosen.iter().find(|(n, _)| Some(*n) == number) else {
+            return Err(self.source.value(&steps, "mesh nodes belong to flexible bodies; name a point instead"));
+        };
+        let wrap = |source| SceneError::ModalFile { path: self.source.path.clone(), at: self.source.at(&steps), source };
+        let position = selection.file.node_position(node).map_err(wrap)?;
+        let displacement = selection.file.node_displacement(node).map_err(wrap)?;
+        let rotation = selection.file.node_rotation(node).map_err(wrap)?;
+        let shape = |&mode: &usize| {
+            let turn = rotation.as_ref().map_or_else(Vector3::zeros, |r| r[mode]);
+            let move_ = displacement[mode];
+            Vector6::new(turn.x, turn.y, turn.z, move_.x, move_.y, move_.z)
+        };
+        Ok(PointDefinition::Node { position, mode_shape: selection.modes.iter().map(shape).collect(), rotations: rotation.is_some() })
+    }
+}
+
+/// 0-based numbers of the modes that the scene and the command line retain.
+fn retained(assembly: &Assembly<'_>, index: usize, body: &BodySpec, frequency_hz: &[f64]) -> Result<Vec<usize>, SceneError> {
+    let steps = [Step::Key("body"), Step::Index(index), Step::Key("modes")];
+    let fault = |message: String| Err(assembly.source.value(&steps, message));
+    let available = frequency_hz.len();
+    if assembly.overrides.rigid.contains(&body.name) {
+        return Ok(Vec::new());
+    }
+    if let Some(count) = assembly.overrides.modes {
+        return Ok((0..count.min(available)).collect());
+    }
+    match &body.modes {
+        None => Ok((0..available).collect()),
+        Some(ModesSpec::List(list)) => {
+            let mut seen = vec![false; available];
+            for &mode in list {
+                if mode == 0 || mode > available {
+                    return fault(format!("mode {mode} does not exist; the modal file has modes 1 to {available}"));
+                }
+                if std::mem::replace(&mut seen[mode - 1], true) {
+                    return fault(format!("mode {mode} is listed twice"));
+                }
+            }
+            Ok(list.iter().map(|m| m - 1).collect())
+        }
+        Some(ModesSpec::Rule(ModesRule { count: Some(count), max_frequency_hz: None })) if *count <= available => Ok((0..*count).collect()),
+        Some(ModesSpec::Rule(ModesRule { count: Some(count), max_frequency_hz: None })) => {
+            fault(format!("count = {count}, but the modal file has only {available} modes"))
+        }
+        Some(ModesSpec::Rule(ModesRule { count: None, max_frequency_hz: Some(limit) })) if *limit > 0.0 => {
+            Ok((0..available).filter(|&j| frequency_hz[j] <= *limit).collect())
+        }
+        Some(ModesSpec::Rule(_)) => fault("give { count = N } or { max_frequency_hz = F } with F positive".into()),
+    }
+}
+
+fn inertia_order(source: &Source, index: usize, body: &BodySpec) -> Result<InertiaOrder, SceneError> {
+    match body.inertia_order {
+        Some(0) => Ok(InertiaOrder::Zeroth),
+        Some(1) => Ok(InertiaOrder::First),
+        Some(2) | None => Ok(InertiaOrder::Second),
+        Some(other) => {
+            Err(source.value(&[Step::Key("body"), Step::Index(index), Step::Key("inertia_order")], format!("{other} must be 0, 1 or 2")))
+        }
+    }
+}
