@@ -5,6 +5,7 @@
 pub mod build;
 pub mod build_closure;
 pub mod closure;
+pub mod definition;
 pub mod error;
 pub mod flexible_body;
 pub mod hinge;
