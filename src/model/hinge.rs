@@ -241,6 +241,18 @@ impl HingeKind {
         }
     }
 
+    /// Coordinates that a unit of time with the constant small rates `step` leads to from `q`: what Newton steps on coordinates ask for.
+    /// Unlike the increments of [`Self::advance`], the travel of a free hinge is in O axes, as its rates are.
+    pub fn displace(&self, q: &[f64], step: &[f64], out: &mut [f64]) {
+        if !matches!(self, Self::Free) {
+            self.advance(q, step, out);
+            return;
+        }
+        let r = rotation::matrix_of_quaternion(&quaternion_in(&q[3..7]));
+        let travel = r * Vector3::new(step[3], step[4], step[5]);
+        self.advance(q, &[step[0], step[1], step[2], travel.x, travel.y, travel.z], out);
+    }
+
     /// Rate of the increment `delta` of [`Self::advance`] when the hinge stands at `q` (already advanced) and moves with `v`.
     pub fn increment_rate(&self, q: &[f64], delta: &[f64], v: &[f64], out: &mut [f64]) {
         if !self.has_quaternion() {

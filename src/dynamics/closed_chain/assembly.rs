@@ -172,7 +172,7 @@ fn moved(system: &System, state: &State, step: &DVector<f64>) -> State {
         let delta = &mut delta[..v.len()];
         delta.iter_mut().zip(v).for_each(|(d, m)| *d = step[m]);
         if delta.iter().any(|d| *d != 0.0) {
-            body.hinge.kind.advance(&state.position[q.clone()], delta, &mut out.position[q]);
+            body.hinge.kind.displace(&state.position[q.clone()], delta, &mut out.position[q]);
         }
     }
     for (m, eta) in out.modal_position.iter_mut().enumerate() {

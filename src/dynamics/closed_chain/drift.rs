@@ -111,7 +111,7 @@ fn correct(system: &System, state: &mut State, workspace: &mut Workspace, positi
             let mut base = [0.0; MAX_RATES + 1];
             let base = &mut base[..q.len()];
             base.copy_from_slice(&state.position[q.clone()]);
-            body.hinge.kind.advance(base, &hinge[v], &mut state.position[q]);
+            body.hinge.kind.displace(base, &hinge[v], &mut state.position[q]);
         } else {
             state.velocity[v.clone()].iter_mut().zip(&hinge[v]).for_each(|(a, b)| *a += b);
         }
