@@ -42,9 +42,6 @@ pub fn equations(system: &System, state: &State) -> DenseEquations {
     let mut unit = state.clone();
     let mut columns = Vec::with_capacity(n);
     let mut closure_map = DMatrix::zeros(system.closure_rows(), n);
-    if let Some(chain) = &mut workspace.closed {
-        chain.follow_pose(system, state, &workspace.pose);
-    }
     for i in 0..n {
         unit.velocity.fill(0.0);
         unit.modal_velocity.fill(0.0);
@@ -55,7 +52,7 @@ pub fn equations(system: &System, state: &State) -> DenseEquations {
         }
         velocity_outward::velocity_outward(system, &unit, &workspace.pose, &mut workspace.velocity);
         if let Some(chain) = &workspace.closed {
-            chain.rates(system, &unit, &workspace.velocity, closure_map.column_mut(i).as_mut_slice());
+            chain.rates(system, &unit, &workspace.pose, &workspace.velocity, closure_map.column_mut(i).as_mut_slice());
         }
         columns.push(workspace.velocity.bodies.iter().map(|b| b.V).collect::<Vec<_>>());
     }
@@ -99,7 +96,7 @@ pub fn equations(system: &System, state: &State) -> DenseEquations {
     }
     let mut sweep = NewtonEuler::new(system);
     sweep.sweep(system, state, &prescribed.as_slice()[..nv], &vec![0.0; nm], &workspace.pose, &workspace.force);
-    let closure_bias = closure_bias(system, state, &mut workspace, &sweep, &prescribed.as_slice()[..nv]);
+    let closure_bias = closure_bias(system, &workspace, &sweep, &prescribed.as_slice()[..nv]);
     let (mut hinge, mut modal) = (vec![0.0; nv], vec![0.0; nm]);
     sweep.generalised_force(system, state, &workspace.pose, &mut hinge, &mut modal);
     let mut force = DVector::zeros(n);
@@ -113,20 +110,15 @@ pub fn equations(system: &System, state: &State) -> DenseEquations {
 }
 
 /// Accelerations along the blocked directions by the independent sweep.
-fn closure_bias(system: &System, state: &State, workspace: &mut Workspace, sweep: &NewtonEuler, hinge: &[f64]) -> DVector<f64> {
+fn closure_bias(system: &System, workspace: &Workspace, sweep: &NewtonEuler, hinge: &[f64]) -> DVector<f64> {
     let mut out = DVector::zeros(system.closure_rows());
     let modal = vec![0.0; system.modal_count];
     let motion =
-        Motion { body: |k: usize| sweep.body_acceleration(k), world: force_inward::world_acceleration(system), hinge, modal: &modal };
-    if let Some(chain) = &mut workspace.closed {
-        chain.follow_rates(system, state, &workspace.velocity);
-        for (closure, at) in system.closures.iter().zip(&chain.closures) {
-            at.along(closure, system, &motion, &mut out.as_mut_slice()[closure.rows()]);
-            for (o, b) in out.as_mut_slice()[closure.rows()].iter_mut().zip(&at.bias) {
-                *o += b;
-            }
-        }
+        Motion { body: |k: usize| sweep.body_acceleration(k), world: force_inward::world_acceleration(system), hinge, modal: Some(&modal) };
+    for (closure, at) in system.closures.iter().zip(&workspace.pose.closures) {
+        at.along(closure, system, &motion, &mut out.as_mut_slice()[closure.rows()]);
     }
+    out.iter_mut().zip(&workspace.velocity.closure_bias).for_each(|(o, b)| *o += b);
     out
 }
 

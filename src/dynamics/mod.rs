@@ -40,6 +40,7 @@
 //! `Pi(eta) = [Jl(Phi_r eta) Phi_r; Phi_t]`, the rate of the finite rotation `exp(Phi_r eta)`, so that energy is conserved to the
 //! integrator's order. Gravity acts as the acceleration `-g` of the world, so `alpha` holds what an accelerometer would feel.
 
+pub mod aggregate;
 pub mod closed_chain;
 pub mod dense;
 pub mod energy;
@@ -53,6 +54,7 @@ pub mod world;
 
 use crate::model::{State, System};
 use closed_chain::ClosedChain;
+use nalgebra::Vector6;
 use sweep::acceleration_outward::AccelerationScratch;
 use sweep::force_inward::ForceScratch;
 use sweep::inertia_inward::InertiaScratch;
@@ -102,6 +104,37 @@ pub enum DynamicsError {
         /// Blocked directions.
         rows: usize,
     },
+    /// Independent coordinates of an aggregate that move no mass.
+    #[error(
+        "the loops closed by {closures}: the inertia along {coordinate} of \"{body}\" is {inertia:e}, which is zero beside {scale:e}; \
+         give the bodies there mass or inertia, or hold the closures by the tree_augmented method"
+    )]
+    SingularAggregate {
+        /// Names of the closures, quoted.
+        closures: String,
+        /// The independent coordinate.
+        coordinate: String,
+        /// Name of its body.
+        body: String,
+        /// Pivot found.
+        inertia: f64,
+        /// What it was compared with.
+        scale: f64,
+    },
+    /// An embedded closure that no state nearby closes.
+    #[error("closure \"{closure}\" came open by {residual:e} m or rad, and no state nearby closes it")]
+    Unclosed {
+        /// Name of the closure that is furthest open.
+        closure: String,
+        /// What is left open (m or rad).
+        residual: f64,
+    },
+    /// An embedded loop that loses rank, so that its independent coordinates no longer carry the others.
+    #[error("closure \"{closure}\" is at a change point of its loop, where the independent coordinates no longer carry the others")]
+    ChangePoint {
+        /// Name of the closure.
+        closure: String,
+    },
     /// Loop inertias that are not numbers.
     #[error("the inertia of the loops (the first closed by \"{closure}\") left finite numbers")]
     BrokenClosures {
@@ -117,8 +150,11 @@ impl DynamicsError {
     pub fn is_breakdown(&self) -> bool {
         match self {
             // half of the digits lost is beyond rounding
-            Self::SingularHinge { inertia, scale, .. } => !(inertia.is_finite() && scale.is_finite() && *inertia >= -1e-8 * scale.abs()),
-            Self::SingularModes { .. } | Self::ContradictoryClosures { .. } => false,
+            Self::SingularHinge { inertia, scale, .. } | Self::SingularAggregate { inertia, scale, .. } => {
+                !(inertia.is_finite() && scale.is_finite() && *inertia >= -1e-8 * scale.abs())
+            }
+            Self::Unclosed { residual, .. } => !residual.is_finite(),
+            Self::SingularModes { .. } | Self::ContradictoryClosures { .. } | Self::ChangePoint { .. } => false,
             Self::BrokenClosures { .. } => true,
         }
     }
@@ -155,10 +191,35 @@ impl Workspace {
         }
     }
 
+    /// Load of closure `index` at the last evaluation: on b at b's point, in a's axes; zero for a gear.
+    #[must_use]
+    pub fn closure_load(&self, system: &System, index: usize) -> Vector6<f64> {
+        let closure = &system.closures[index];
+        let load = |c: &ClosedChain| self.pose.closures[index].load(closure, &c.lambda[closure.rows()]);
+        self.closed.as_deref().map_or_else(Vector6::zeros, load)
+    }
+
+    /// How near the loops are to a change point at the last evaluation, where they lose rank; infinite without closures.
+    #[must_use]
+    pub fn distance_to_rank_loss(&self) -> f64 {
+        self.closed.as_ref().map_or(f64::INFINITY, |c| c.distance_to_rank_loss(&self.pose))
+    }
+
+    /// Moves the dependent coordinates and rates of all aggregates until their closures close; nothing happens without aggregates.
+    ///
+    /// # Errors
+    /// If no state nearby closes.
+    pub fn close_aggregates(&mut self, system: &System, state: &mut State) -> Result<(), DynamicsError> {
+        match &mut self.closed {
+            Some(chain) if !system.aggregates.is_empty() => chain.close_aggregates(system, state, &mut self.pose),
+            _ => Ok(()),
+        }
+    }
+
     /// What to say of loads that the last evaluation could not determine: redundant closures share them by least norm.
     #[must_use]
     pub fn redundancy_warning(&self, system: &System) -> Option<String> {
-        let report = self.closed.as_ref()?.rank_report(system);
+        let report = self.closed.as_ref()?.rank_report(system, &self.pose);
         let redundant = report.rows.checked_sub(report.rank).filter(|n| *n > 0)?;
         Some(format!(
             "warning: {redundant} of {} closed directions are redundant ({}); how the loads divide over their loops is not determined, those reported have \
@@ -179,13 +240,13 @@ pub fn forward_dynamics(system: &System, state: &State, workspace: &mut Workspac
     let Workspace { pose, velocity, inertia, force, acceleration, closed } = workspace;
     sweep::pose_outward::pose_outward(system, state, pose);
     sweep::velocity_outward::velocity_outward(system, state, pose, velocity);
+    closed_chain::check_embedded(system, pose, velocity)?;
     sweep::inertia_inward::inertia_inward(system, pose, inertia)?;
     sweep::force_inward::force_inward(system, state, pose, velocity, inertia, force);
     sweep::acceleration_outward::acceleration_outward(system, pose, velocity, inertia, force, acceleration);
     if let Some(chain) = closed {
-        chain.follow_pose(system, state, pose);
-        chain.follow_rates(system, state, velocity);
-        chain.close(system, pose, inertia, force, acceleration)?;
+        chain.close(system, pose, velocity, inertia, force, acceleration)?;
+        chain.recover_embedded(system, state, pose, velocity, inertia, acceleration, force);
     }
     Ok(())
 }

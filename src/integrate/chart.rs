@@ -92,7 +92,8 @@ impl<'a> Chart<'a> {
             State { time, position: vec![], velocity: vec![], modal_position: vec![], modal_velocity: vec![] },
         );
         self.state_of(time, y, &mut state);
-        let done = self.rate_at(&state, y, rate);
+        let closed = self.workspace.close_aggregates(self.system, &mut state);
+        let done = closed.and_then(|()| self.rate_at(&state, y, rate));
         self.state = state;
         done
     }
@@ -133,6 +134,10 @@ impl<'a> Chart<'a> {
             State { time, position: vec![], velocity: vec![], modal_position: vec![], modal_velocity: vec![] },
         );
         self.state_of(time, y, &mut state);
+        // independent coordinates are chosen between steps; the step's last evaluation has closed this state already
+        self.workspace.pose.hold_coordinates(false);
+        let _ = self.workspace.close_aggregates(self.system, &mut state);
+        self.workspace.pose.hold_coordinates(true);
         std::mem::swap(&mut self.base, &mut state);
         self.state = state;
         self.work = y[2 * self.increments()];

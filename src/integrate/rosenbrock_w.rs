@@ -33,7 +33,7 @@ use super::w_tableau::{STAGES, WTableau};
 use crate::dynamics::DynamicsError;
 use crate::dynamics::sweep::inertia_inward::{AddedInertia, InertiaScratch, inertia_inward_with};
 use crate::dynamics::sweep::pose_outward::{PoseScratch, pose_outward};
-use crate::dynamics::sweep::response::{ResponseScratch, response};
+use crate::dynamics::sweep::response::Response;
 use crate::model::hinge::MAX_RATES;
 use crate::model::{Body, HingeKind, State};
 use nalgebra::{Matrix3, Vector3};
@@ -63,10 +63,9 @@ pub struct RosenbrockW {
     added: AddedInertia,
     /// Stiffness of the springs on the rates of each hinge at the step's start, none without springs.
     spring: Vec<Option<Block>>,
-    /// Generalised forces of a stage.
-    hinge_force: Vec<f64>,
-    modal_force: Vec<f64>,
-    response: ResponseScratch,
+    /// Generalised forces of a stage, and what they cause.
+    response: Response,
+    all: Vec<usize>,
 }
 
 impl RosenbrockW {
@@ -91,9 +90,8 @@ impl RosenbrockW {
             inertia: InertiaScratch::new(system),
             added: AddedInertia { modal: vec![1.0; system.modal_count], hinge: vec![None; system.bodies.len()] },
             spring: vec![None; system.bodies.len()],
-            hinge_force: vec![0.0; system.velocity_count],
-            modal_force: vec![0.0; system.modal_count],
-            response: ResponseScratch::new(system),
+            response: Response::new(system),
+            all: (0..system.bodies.len()).collect(),
         }
     }
 
@@ -144,11 +142,11 @@ impl RosenbrockW {
                 for (j, m) in body.modal_range().enumerate() {
                     let rate = s[n + nv + m] + g * k[n + nv + m];
                     let way = s[nv + m] + g * k[nv + m] + h * g * rate;
-                    self.modal_force[m] = -h * (flexible.stiffness[j] * way + flexible.damping[j] * rate);
+                    self.response.external_modal[m] = -h * (flexible.stiffness[j] * way + flexible.damping[j] * rate);
                 }
             }
             let v = body.velocity_range();
-            let force = &mut self.hinge_force[v.clone()];
+            let force = &mut self.response.applied[v.clone()];
             force.fill(0.0);
             if self.added.hinge[b].is_none() {
                 continue;
@@ -169,7 +167,7 @@ impl RosenbrockW {
                 *f -= h * c * r;
             }
         }
-        response(system, &self.pose, &self.inertia, &self.hinge_force, &self.modal_force, &mut self.response);
+        self.response.solve(system, &self.pose, &self.inertia, &self.all);
         k[n..n + nv].iter_mut().zip(&self.response.hinge).for_each(|(k, x)| *k += x);
         k[n + nv..2 * n].iter_mut().zip(&self.response.modal).for_each(|(k, x)| *k += x);
         for m in 0..n - nv {

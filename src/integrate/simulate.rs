@@ -307,9 +307,7 @@ impl Run<'_, '_> {
             let floor = 16.0 * f64::EPSILON * time.abs().max(stop.abs());
             if step < floor && step < left {
                 let place = fastest_place(self.chart);
-                if self.chart.workspace.closed.as_ref().is_some_and(|c| c.schur.distance_to_rank_loss() < CHANGE_POINT)
-                    && self.chart.base.is_finite()
-                {
+                if self.chart.workspace.distance_to_rank_loss() < CHANGE_POINT && self.chart.base.is_finite() {
                     let place = format!("{place}, at a change point of the loops, which fixed steps (rk4) pass");
                     return Err(RunFailure::StepUnderflow { time, step, place });
                 }
@@ -416,7 +414,7 @@ const CHANGE_POINT: f64 = 1e-2;
 
 /// The closure that is furthest open at the poses in `workspace`.
 fn opened(system: &System, workspace: &Workspace, time: f64) -> RunFailure {
-    let residual = |i: usize| workspace.closed.as_ref().map_or(0.0, |chain| chain.residual(system, i));
+    let residual = |i: usize| workspace.pose.closure_residual(system, i);
     let worst = (0..system.closures.len()).max_by(|&i, &j| residual(i).total_cmp(&residual(j))).unwrap_or(0);
     RunFailure::Opened { time, closure: system.closures[worst].name.clone(), residual: residual(worst) }
 }

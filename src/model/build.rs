@@ -53,6 +53,8 @@ impl Definition {
             bodies: Vec::with_capacity(order.len()),
             loads: Vec::new(),
             closures: Vec::new(),
+            aggregates: Vec::new(),
+            roles: Vec::new(),
             prescribed: Vec::new(),
             position_count: 0,
             velocity_count: 0,
@@ -74,6 +76,7 @@ impl Definition {
             rows = closure.rows().end;
             system.closures.push(closure);
         }
+        (system.aggregates, system.roles) = super::aggregate::aggregates(&system);
         state.apply_prescribed(&system);
         Ok((system, state))
     }

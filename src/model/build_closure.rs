@@ -48,11 +48,7 @@ impl Builder<'_> {
             return Err(ModelError::BadAxes {
                 place: place("closure", index, "method"),
                 item: given.name.clone(),
-                found: if method == "constraint_embedding" {
-                    "constraint embedding is not part of this version".into()
-                } else {
-                    format!("method = \"{method}\" is not a method")
-                },
+                found: format!("method = \"{method}\" is not a method"),
                 expected: format!("known methods: {}", ClosureMethod::NAMES.join(", ")),
             });
         };

@@ -108,16 +108,31 @@ pub enum ClosureMethod {
     /// The loop is cut there, and multipliers close it (Paper section 4).
     #[default]
     TreeAugmented,
+    /// The bodies of the loop become one aggregate body with independent coordinates (Paper section 5).
+    ConstraintEmbedding,
 }
 
 impl ClosureMethod {
     /// Methods by the name that scenes use; the first is the default.
-    pub const NAMES: [&'static str; 2] = ["auto", "tree_augmented"];
+    pub const NAMES: [&'static str; 3] = ["auto", "tree_augmented", "constraint_embedding"];
 
-    /// The method of that name, if this version has it.
+    /// The method of that name.
     #[must_use]
     pub fn from_name(name: &str) -> Option<Self> {
-        Self::NAMES.contains(&name).then_some(Self::TreeAugmented)
+        match name {
+            "auto" | "tree_augmented" => Some(Self::TreeAugmented),
+            "constraint_embedding" => Some(Self::ConstraintEmbedding),
+            _ => None,
+        }
+    }
+
+    /// The name used in scenes and reports.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::TreeAugmented => Self::NAMES[1],
+            Self::ConstraintEmbedding => Self::NAMES[2],
+        }
     }
 }
 

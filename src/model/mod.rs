@@ -2,6 +2,7 @@
 //!
 //! [`build`] turns a definition by names into a [`System`] by indices and refuses what cannot be; [`State`] holds what is integrated.
 
+pub mod aggregate;
 pub mod build;
 pub mod build_closure;
 pub mod closure;
@@ -15,6 +16,7 @@ pub mod state;
 pub mod surface;
 pub mod time_function;
 
+pub use aggregate::{Aggregate, Member, Role};
 pub use closure::{Closure, ClosureJoint, ClosureKind, ClosureMethod, ClosureSide};
 pub use error::ModelError;
 pub use flexible_body::{Attachment, FlexibleBody, InertiaOrder};
@@ -119,6 +121,10 @@ pub struct System {
     pub loads: Vec<Load>,
     /// Closures in the order of their definition.
     pub closures: Vec<Closure>,
+    /// Sub-trees whose closures are embedded.
+    pub aggregates: Vec<Aggregate>,
+    /// What the sweeps do at each body; empty without aggregates.
+    pub roles: Vec<Role>,
     /// Indices of bodies whose hinge is prescribed.
     pub prescribed: Vec<usize>,
     /// Length of [`State::position`].
@@ -142,6 +148,13 @@ impl System {
     #[must_use]
     pub fn hinge_index(&self, name: &str) -> Option<usize> {
         self.bodies.iter().position(|b| b.hinge.name == name)
+    }
+
+    /// What the sweeps do at a body.
+    #[inline]
+    #[must_use]
+    pub fn role(&self, body: usize) -> Role {
+        self.roles.get(body).copied().unwrap_or(Role::Own)
     }
 
     /// Number of multipliers of all closures.

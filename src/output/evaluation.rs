@@ -106,8 +106,8 @@ fn closures(system: &System, workspace: &Workspace) -> Named<ClosureEvaluation> 
     let Some(chain) = &workspace.closed else { return Named::default() };
     let record = |(index, closure): (usize, &Closure)| {
         let coordinate_force = matches!(closure.joint, ClosureJoint::Gear { .. }).then(|| chain.lambda[closure.first_row]);
-        let load = chain.load(system, index).into();
-        (closure.name.clone(), ClosureEvaluation { load, coordinate_force, residual: chain.residual(system, index) })
+        let load = workspace.closure_load(system, index).into();
+        (closure.name.clone(), ClosureEvaluation { load, coordinate_force, residual: workspace.pose.closure_residual(system, index) })
     };
     system.closures.iter().enumerate().map(record).collect()
 }

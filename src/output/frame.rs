@@ -2,7 +2,6 @@
 
 use super::plan::OutputPlan;
 use super::surface::StressPeak;
-use crate::dynamics::closed_chain::ClosedChain;
 use crate::dynamics::energy::{Energy, Momentum, balance};
 use crate::dynamics::hinge_load::hinge_load;
 use crate::dynamics::inverse::{AuditResidual, NewtonEuler};
@@ -69,8 +68,8 @@ impl FrameEvaluator {
                 *peak = surface.surface.stress_peak(&state.modal_position[system.bodies[surface.body].modal_range()]);
             }
         }
-        let worst = |chain: &ClosedChain| (0..system.closures.len()).map(|i| chain.residual(system, i)).fold(0.0, f64::max);
-        frame.closure = workspace.closed.as_deref().map(worst);
+        let worst = (0..system.closures.len()).map(|i| workspace.pose.closure_residual(system, i)).reduce(f64::max);
+        frame.closure = worst;
         frame.audit = audit.as_mut().map(|audit| audit.audit(system, state, workspace));
     }
 }

@@ -6,7 +6,7 @@ use nalgebra::DVector;
 use pliant::dynamics::inverse::NewtonEuler;
 use pliant::dynamics::sweep::inertia_inward::{AddedInertia, InertiaScratch, inertia_inward_with};
 use pliant::dynamics::sweep::pose_outward::{PoseScratch, pose_outward};
-use pliant::dynamics::sweep::response::{ResponseScratch, response};
+use pliant::dynamics::sweep::response::Response;
 use pliant::dynamics::{Workspace, dense, forward_dynamics};
 use pliant::model::modal_body::Boundary;
 use pliant::model::{State, System};
@@ -78,7 +78,8 @@ fn response_to_generalised_forces_solves_with_the_mass_matrix_and_what_is_added_
         let mut pose = PoseScratch::new(&system);
         pose_outward(&system, &state, &mut pose);
         let mut inertia = InertiaScratch::new(&system);
-        let mut found = ResponseScratch::new(&system);
+        let mut found = Response::new(&system);
+        let everything: Vec<usize> = (0..system.bodies.len()).collect();
         let wave = |i: usize| (1.7 * i as f64 + 0.3).sin();
         let force: Vec<f64> = (0..n).map(wave).collect();
         // every block: nothing on some hinges, a full matrix on others
@@ -105,7 +106,9 @@ fn response_to_generalised_forces_solves_with_the_mass_matrix_and_what_is_added_
             let mut expected = vec![0.0; n];
             equations.free.iter().zip(&solution).for_each(|(&i, x)| expected[i] = *x);
             inertia_inward_with(&system, &pose, added, &mut inertia).unwrap();
-            response(&system, &pose, &inertia, &force[..nv], &force[nv..], &mut found);
+            found.applied.copy_from_slice(&force[..nv]);
+            found.external_modal.copy_from_slice(&force[nv..]);
+            found.solve(&system, &pose, &inertia, &everything);
             let found = [&found.hinge[..], &found.modal].concat();
             assert_close(&found, &expected, 400.0 * EPS * equations.condition().max(10.0), &name);
         }

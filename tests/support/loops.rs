@@ -13,6 +13,15 @@ use pliant::spatial::rotation;
 use rand::rngs::StdRng;
 use rand::{Rng, SeedableRng};
 
+/// Methods that hold closures.
+pub const METHODS: [&str; 2] = ["tree_augmented", "constraint_embedding"];
+
+/// The same definition with all closures held by `method`.
+pub fn held_by(mut definition: Definition, method: &str) -> Definition {
+    definition.closures.iter_mut().for_each(|c| c.method = Some(method.to_owned()));
+    definition
+}
+
 /// Kinds with their number of axes.
 pub const CLOSURES: [(&str, usize); 7] =
     [("fixed", 0), ("revolute", 1), ("universal", 2), ("spherical", 0), ("cylindrical", 1), ("prismatic", 1), ("planar", 1)];

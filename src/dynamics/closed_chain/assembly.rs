@@ -88,9 +88,9 @@ fn violations(system: &System, state: &State, workspace: &Workspace, positions: 
     let mut out = DVector::zeros(system.closure_rows());
     if let Some(chain) = &workspace.closed {
         if positions {
-            chain.residuals(system, out.as_mut_slice());
+            workspace.pose.residuals(system, out.as_mut_slice());
         } else {
-            chain.rates(system, state, &workspace.velocity, out.as_mut_slice());
+            chain.rates(system, state, &workspace.pose, &workspace.velocity, out.as_mut_slice());
         }
     }
     out
@@ -124,7 +124,7 @@ fn jacobian(system: &System, pose: &PoseScratch, chain: &mut ClosedChain, modes:
         unit.fill(0.0);
         unit[row] = 1.0;
         chain.response.clear();
-        chain.push(system, &unit);
+        chain.push(system, pose, &unit);
         let (external, modal) = (&mut chain.response.external, &mut chain.response.external_modal);
         for k in (0..system.bodies.len()).rev() {
             let (body, own) = (&system.bodies[k], &pose.bodies[k]);

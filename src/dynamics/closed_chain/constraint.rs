@@ -7,6 +7,7 @@
 use crate::dynamics::frame_motion::FramePose;
 use crate::dynamics::sweep::pose_outward::PoseScratch;
 use crate::dynamics::world::WorldFrame;
+use crate::model::aggregate::common_ancestor;
 use crate::model::closure::MAX_ROWS;
 use crate::model::{Closure, ClosureJoint, ClosureKind, ClosureSide, State, System};
 use crate::spatial::rotation;
@@ -31,7 +32,7 @@ impl Side {
         Self { frame: FramePose::default(), point: Vector3::zeros(), to_a: Matrix3::identity(), shape }
     }
 
-    /// Motion of the point at p for the motion of the body and of its modes, in a's axes.
+    /// Motion of the point at p for the motion of the body and of its modes, in a's axes; modes left out rest.
     fn motion(&self, body: &Vector6<f64>, modal: &[f64]) -> Vector6<f64> {
         let moved = motion_to(&self.point, body) + self.shape.iter().zip(modal).map(|(s, e)| s * *e).sum::<Vector6<f64>>();
         rotate(&self.to_a, &moved)
@@ -46,8 +47,46 @@ pub struct Motion<'a, F: Fn(usize) -> Vector6<f64>> {
     pub world: Vector6<f64>,
     /// Of the hinge rates.
     pub hinge: &'a [f64],
-    /// Of the modal coordinates.
-    pub modal: &'a [f64],
+    /// Of the modal coordinates; none where they rest.
+    pub modal: Option<&'a [f64]>,
+}
+
+/// Something that closures load.
+pub trait ForceSink {
+    /// A force on the rigid rows of a body, in its recursion's frame.
+    fn on_body(&mut self, body: usize, wrench: &Vector6<f64>);
+    /// The force (body axes) on the modes of a body at a point with that mode shape.
+    fn on_modes(&mut self, body: usize, shape: &[Vector6<f64>], force: &Vector6<f64>);
+    /// A force on the hinge rate `velocity` (among all rates) of a body.
+    fn on_rate(&mut self, body: usize, velocity: usize, force: f64);
+}
+
+/// Forces on all bodies of a system.
+#[derive(Debug)]
+pub struct SystemForces<'a> {
+    /// The system.
+    pub system: &'a System,
+    /// On the rigid rows of each body, in the recursion's frame.
+    pub external: &'a mut [Vector6<f64>],
+    /// On the modes.
+    pub modal: &'a mut [f64],
+    /// On the hinge rates.
+    pub applied: &'a mut [f64],
+}
+
+impl ForceSink for SystemForces<'_> {
+    fn on_body(&mut self, body: usize, wrench: &Vector6<f64>) {
+        self.external[body] += wrench;
+    }
+
+    fn on_modes(&mut self, body: usize, shape: &[Vector6<f64>], force: &Vector6<f64>) {
+        let modes = self.system.bodies[body].modal_range();
+        self.modal[modes].iter_mut().zip(shape).for_each(|(m, s)| *m += s.dot(force));
+    }
+
+    fn on_rate(&mut self, _body: usize, velocity: usize, force: f64) {
+        self.applied[velocity] += force;
+    }
 }
 
 /// One closure at the present state.
@@ -60,8 +99,6 @@ pub struct ClosureAt {
     translation: Vector3<f64>,
     /// Blocked directions, in a's axes at p.
     rows: [Vector6<f64>; MAX_ROWS],
-    /// What the rates alone make of the rows' accelerations.
-    pub bias: [f64; MAX_ROWS],
     residual: [f64; MAX_ROWS],
 }
 
@@ -81,18 +118,6 @@ fn pose_in(system: &System, pose: &PoseScratch, body: Option<usize>, top: Option
         open = system.bodies[k].parent;
     }
     at
-}
-
-/// The last body that carries both, none for the world: parents have smaller indices.
-fn common_ancestor(system: &System, mut a: Option<usize>, mut b: Option<usize>) -> Option<usize> {
-    while a != b {
-        if a > b {
-            a = a.and_then(|k| system.bodies[k].parent);
-        } else {
-            b = b.and_then(|k| system.bodies[k].parent);
-        }
-    }
-    a
 }
 
 /// Two unit vectors that make a right-handed triad with `axis`.
@@ -122,7 +147,6 @@ impl ClosureAt {
             rotation: Matrix3::identity(),
             translation: Vector3::zeros(),
             rows: [Vector6::zeros(); MAX_ROWS],
-            bias: [0.0; MAX_ROWS],
             residual: [0.0; MAX_ROWS],
         }
     }
@@ -141,7 +165,7 @@ impl ClosureAt {
             }
             ClosureJoint::Frames { kind, a, b } => {
                 let Some(sides) = &mut self.sides else { return };
-                let top = common_ancestor(system, a.body, b.body);
+                let top = common_ancestor(&system.bodies, a.body, b.body);
                 let mut frames = [WorldFrame::default(); 2];
                 for ((side, at), frame) in [a, b].into_iter().zip(sides.iter_mut()).zip(&mut frames) {
                     let eta = side.body.map_or(&[][..], |k| &state.modal_position[system.bodies[k].modal_range()]);
@@ -216,10 +240,10 @@ impl ClosureAt {
         }
     }
 
-    /// Takes in the rates of an evaluation: what they alone make of the rows' accelerations.
-    pub fn follow_rates(&mut self, closure: &Closure, system: &System, state: &State, velocity: impl Fn(usize) -> Vector6<f64>) {
+    /// What the rates alone make of the rows' accelerations, written to `out` (one number per row).
+    pub fn bias(&self, closure: &Closure, system: &System, state: &State, velocity: impl Fn(usize) -> Vector6<f64>, out: &mut [f64]) {
         let (ClosureJoint::Frames { kind, a, b }, Some(sides)) = (&closure.joint, &self.sides) else {
-            self.bias[0] = 0.0;
+            out.fill(0.0);
             return;
         };
         let [(turn_a, at_a, bias_a), (turn_b, at_b, bias_b)] = [(a, &sides[0]), (b, &sides[1])].map(|(side, at)| {
@@ -232,13 +256,13 @@ impl ClosureAt {
         let seen = linear(&at_b) - linear(&at_a);
         let coriolis = spatial(&turn_a.cross(&turn_b), &(turn_a.cross(&seen) * 2.0));
         let bias = bias_b - bias_a - coriolis;
-        for (b, row) in self.bias.iter_mut().zip(&self.rows[..closure.row_count()]) {
+        for (b, row) in out.iter_mut().zip(&self.rows) {
             *b = row.dot(&bias);
         }
         if let ClosureKind::Universal { axes: [first, second] } = kind {
             // the row itself turns with b
             let (relative, carried) = (turn_b - turn_a, self.rotation * second);
-            self.bias[0] += relative.cross(&carried).cross(first).dot(&relative) / first.cross(second).norm();
+            out[0] += relative.cross(&carried).cross(first).dot(&relative) / first.cross(second).norm();
         }
     }
 
@@ -249,7 +273,7 @@ impl ClosureAt {
             (ClosureJoint::Frames { a, b, .. }, Some(sides)) => {
                 let [from, to] = [(a, &sides[0]), (b, &sides[1])].map(|(side, at)| match side.body {
                     None => rotate(&at.to_a, &motion.world),
-                    Some(k) => at.motion(&(motion.body)(k), &motion.modal[system.bodies[k].modal_range()]),
+                    Some(k) => at.motion(&(motion.body)(k), motion.modal.map_or(&[][..], |m| &m[system.bodies[k].modal_range()])),
                 });
                 let relative = to - from;
                 for (o, row) in out.iter_mut().zip(&self.rows) {
@@ -260,30 +284,31 @@ impl ClosureAt {
         }
     }
 
+    /// Mode shapes at b's point on both sides.
+    pub fn shapes(&self) -> impl Iterator<Item = &Vector6<f64>> {
+        self.sides.iter().flatten().flat_map(|side| &side.shape)
+    }
+
+    /// True if blocked direction `row` is a rotation.
+    #[must_use]
+    pub fn blocks_turning(&self, row: usize) -> bool {
+        angular(&self.rows[row]).norm_squared() > 0.0
+    }
+
     /// Adds `G' lambda`: the forces of the multipliers on bodies, modes and hinge rates.
-    pub fn push(
-        &self,
-        closure: &Closure,
-        system: &System,
-        lambda: &[f64],
-        external: &mut [Vector6<f64>],
-        modal: &mut [f64],
-        applied: &mut [f64],
-    ) {
+    pub fn push(&self, closure: &Closure, lambda: &[f64], sink: &mut impl ForceSink) {
         match (&closure.joint, &self.sides) {
             (ClosureJoint::Gear { a, b, ratio, .. }, _) => {
-                applied[b.velocity] += lambda[0];
-                applied[a.velocity] -= ratio * lambda[0];
+                sink.on_rate(b.body, b.velocity, lambda[0]);
+                sink.on_rate(a.body, a.velocity, -ratio * lambda[0]);
             }
             (ClosureJoint::Frames { a, b, .. }, Some(sides)) => {
                 let force = self.load(closure, lambda);
                 for (side, at, sign) in [(a, &sides[0], -1.0), (b, &sides[1], 1.0)] {
                     let Some(k) = side.body else { continue };
                     let f = rotate_back(&at.to_a, &force) * sign;
-                    external[k] += force_from(&at.point, &f);
-                    for (m, s) in modal[system.bodies[k].modal_range()].iter_mut().zip(&at.shape) {
-                        *m += s.dot(&f);
-                    }
+                    sink.on_body(k, &force_from(&at.point, &f));
+                    sink.on_modes(k, &at.shape, &f);
                 }
             }
             (ClosureJoint::Frames { .. }, None) => {}

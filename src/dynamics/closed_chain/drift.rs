@@ -37,11 +37,10 @@ pub fn measure(system: &System, state: &State, workspace: &mut Workspace) -> Dri
     let Some(chain) = closed else { return Drift::default() };
     pose_outward::pose_outward(system, state, pose);
     velocity_outward::velocity_outward(system, state, pose, velocity);
-    chain.follow_pose(system, state, pose);
     let mut found = std::mem::take(&mut chain.right);
-    chain.residuals(system, &mut found);
+    pose.residuals(system, &mut found);
     let position = largest(&found);
-    chain.rates(system, state, velocity, &mut found);
+    chain.rates(system, state, pose, velocity, &mut found);
     let rate = largest(&found);
     chain.right = found;
     Drift { position, rate, moved: false }
@@ -50,10 +49,11 @@ pub fn measure(system: &System, state: &State, workspace: &mut Workspace) -> Dri
 /// Moves `state` onto the closures; nothing happens without closures or if it is there already.
 ///
 /// # Errors
-/// If an inertia is singular on the way.
+/// If an inertia is singular on the way, or an aggregate cannot be closed.
 pub fn project(system: &System, state: &mut State, workspace: &mut Workspace) -> Result<Drift, DynamicsError> {
+    workspace.close_aggregates(system, state)?;
     let mut drift = measure(system, state, workspace);
-    if workspace.closed.is_none() {
+    if workspace.closed.as_ref().is_none_or(|c| c.cut.is_empty()) {
         return Ok(drift);
     }
     let mut moved = false;
@@ -94,15 +94,19 @@ fn correct(system: &System, state: &mut State, workspace: &mut Workspace, positi
     }
     let mut right = std::mem::take(&mut chain.right);
     if positions {
-        chain.residuals(system, &mut right);
+        pose.residuals(system, &mut right);
     } else {
-        chain.rates(system, state, velocity, &mut right);
+        chain.rates(system, state, pose, velocity, &mut right);
     }
-    right.iter_mut().for_each(|r| *r = -*r);
-    let mut impulse = std::mem::take(&mut chain.column);
-    chain.schur.solve(&right, &mut impulse);
-    chain.push(system, &impulse);
-    (chain.right, chain.column) = (right, impulse);
+    for (x, &row) in chain.cut_right.iter_mut().zip(&chain.cut) {
+        *x = -right[row];
+    }
+    chain.right = right;
+    chain.schur.solve(&chain.cut_right, &mut chain.cut_lambda);
+    chain.scatter_cut();
+    let impulse = std::mem::take(&mut chain.lambda);
+    chain.push(system, pose, &impulse);
+    chain.lambda = impulse;
     chain.response.solve(system, pose, inertia, &chain.all);
     let (hinge, modal) = (&chain.response.hinge, &chain.response.modal);
     for body in system.bodies.iter().filter(|b| !b.hinge.is_prescribed()) {
@@ -118,5 +122,6 @@ fn correct(system: &System, state: &mut State, workspace: &mut Workspace, positi
     }
     let modes = if positions { &mut state.modal_position } else { &mut state.modal_velocity };
     modes.iter_mut().zip(modal).for_each(|(a, b)| *a += b);
+    workspace.close_aggregates(system, state)?;
     Ok(true)
 }

@@ -11,13 +11,14 @@ use crate::dynamics::sweep::acceleration_outward::AccelerationScratch;
 use crate::dynamics::sweep::force_inward::{ForceScratch, world_acceleration};
 use crate::dynamics::sweep::inertia_inward::InertiaScratch;
 use crate::dynamics::sweep::pose_outward::PoseScratch;
+use crate::dynamics::sweep::velocity_outward::VelocityScratch;
 use crate::model::System;
 
 /// Share of the closures' accelerations that may lie where no multiplier reaches before they are said to contradict one another.
 const CONTRADICTION: f64 = 1e-6;
 
 impl ClosedChain {
-    /// Adds the correction pass to the free pass in `force` and `acceleration`; poses and rates must have been followed.
+    /// Adds the correction pass of the cut closures to the free pass in `force` and `acceleration`; nothing happens if none is cut.
     ///
     /// # Errors
     /// If the closures and prescribed motions contradict one another.
@@ -25,25 +26,28 @@ impl ClosedChain {
         &mut self,
         system: &System,
         pose: &PoseScratch,
+        velocity: &VelocityScratch,
         inertia: &InertiaScratch,
         force: &mut ForceScratch,
         acceleration: &mut AccelerationScratch,
     ) -> Result<(), DynamicsError> {
-        self.assemble_loop_inertia(system, pose, inertia);
-        let broken = |_: NotFactored| DynamicsError::BrokenClosures { closure: system.closures[0].name.clone() };
-        self.schur.factor(REDUNDANT).map_err(broken)?;
-        let mut right = std::mem::take(&mut self.right);
-        self.accelerations(system, acceleration, world_acceleration(system), &mut right);
-        let mut sizes = 0.0_f64;
-        for (closure, at) in system.closures.iter().zip(&self.closures) {
-            for (r, bias) in right[closure.rows()].iter_mut().zip(&at.bias) {
-                sizes = sizes.max(r.abs()).max(bias.abs());
-                *r = -(*r + bias);
-            }
+        if self.cut.is_empty() {
+            return Ok(());
         }
-        let (missed, size) = self.schur.solve(&right, &mut self.lambda);
-        let rigid = (0..right.len()).filter(|&row| !self.schur.responds(row)).fold(0.0_f64, |m, row| m.max(right[row].abs()));
+        self.assemble_loop_inertia(system, pose, inertia);
+        self.factor(system, REDUNDANT)?;
+        let mut right = std::mem::take(&mut self.right);
+        self.accelerations(system, pose, acceleration, world_acceleration(system), &mut right);
+        let mut sizes = 0.0_f64;
+        for (x, &row) in self.cut_right.iter_mut().zip(&self.cut) {
+            let bias = velocity.closure_bias[row];
+            sizes = sizes.max(right[row].abs()).max(bias.abs());
+            *x = -(right[row] + bias);
+        }
         self.right = right;
+        let (missed, size) = self.schur.solve(&self.cut_right, &mut self.cut_lambda);
+        let unmoved = (0..self.cut.len()).filter(|&c| !self.schur.responds(c));
+        let rigid = unmoved.fold(0.0_f64, |m, c| m.max(self.cut_right[c].abs()));
         // a right-hand side of rounding has no direction: it is measured against the accelerations it is the difference of
         let felt = self.support.iter().map(|&k| acceleration.alpha[k].amax()).fold(sizes, f64::max);
         let scale = self.schur.largest_scale();
@@ -51,8 +55,9 @@ impl ClosedChain {
             return Err(self.contradiction(system));
         }
 
+        self.scatter_cut();
         let lambda = std::mem::take(&mut self.lambda);
-        self.push(system, &lambda);
+        self.push(system, pose, &lambda);
         self.lambda = lambda;
         self.response.solve(system, pose, inertia, &self.all);
         let part = &self.response;
@@ -73,9 +78,28 @@ impl ClosedChain {
         Ok(())
     }
 
+    /// Factors the loop inertia.
+    pub(super) fn factor(&mut self, system: &System, threshold: f64) -> Result<(), DynamicsError> {
+        let first = self.cut.first().copied();
+        let name = || system.closures.iter().find(|c| first.is_some_and(|row| c.rows().contains(&row))).map(|c| c.name.clone());
+        self.schur.factor(threshold).map_err(|_: NotFactored| DynamicsError::BrokenClosures { closure: name().unwrap_or_default() })
+    }
+
+    /// Multipliers of the cut closures to their places among those of all, and zero for the others.
+    pub(super) fn scatter_cut(&mut self) {
+        self.lambda.fill(0.0);
+        for (&row, l) in self.cut.iter().zip(&self.cut_lambda) {
+            self.lambda[row] = *l;
+        }
+    }
+
     /// The closure that has most of its directions where no multiplier reaches.
     fn contradiction(&self, system: &System) -> DynamicsError {
-        let share = |i: usize| system.closures[i].rows().map(|r| self.schur.redundancy(r)).fold(0.0, f64::max);
+        let share = |i: usize| {
+            let own = system.closures[i].rows();
+            let rows = self.cut.iter().enumerate().filter(|(_, row)| own.contains(row));
+            rows.map(|(c, _)| self.schur.redundancy(c)).fold(0.0, f64::max)
+        };
         let worst = (0..system.closures.len()).max_by(|&i, &j| share(i).total_cmp(&share(j))).unwrap_or(0);
         DynamicsError::ContradictoryClosures {
             closure: system.closures[worst].name.clone(),

@@ -7,7 +7,8 @@ use super::force_inward::{ForceScratch, world_acceleration};
 use super::inertia_inward::InertiaScratch;
 use super::pose_outward::PoseScratch;
 use super::velocity_outward::VelocityScratch;
-use crate::model::System;
+use crate::dynamics::aggregate::acceleration::AggregateAcceleration;
+use crate::model::{Role, System};
 use crate::spatial::shift::{motion_to, rotate, rotate_back};
 use nalgebra::Vector6;
 
@@ -22,6 +23,8 @@ pub struct AccelerationScratch {
     pub hinge: Vec<f64>,
     /// Accelerations of the modal coordinates.
     pub modal: Vec<f64>,
+    /// One per aggregate.
+    pub aggregates: Vec<AggregateAcceleration>,
 }
 
 impl AccelerationScratch {
@@ -33,6 +36,7 @@ impl AccelerationScratch {
             alpha: vec![Vector6::zeros(); system.bodies.len()],
             hinge: vec![0.0; system.velocity_count],
             modal: vec![0.0; system.modal_count],
+            aggregates: system.aggregates.iter().map(AggregateAcceleration::new).collect(),
         }
     }
 }
@@ -49,6 +53,16 @@ pub fn acceleration_outward(
     let world = world_acceleration(system);
     for (k, body) in system.bodies.iter().enumerate() {
         let own = &pose.bodies[k];
+        let role = system.role(k);
+        match role {
+            Role::Member(_) => continue,
+            Role::Heads(index) if !system.aggregates[index].holds_root_modes => {
+                let base = system.aggregates[index].root.map_or(world, |root| out.alpha[root]);
+                follow_aggregate(system, pose, velocity, inertia, force, index, &base, out);
+                continue;
+            }
+            Role::Heads(_) | Role::Own => {}
+        }
         let mut alpha_outer = motion_to(&own.l, &body.parent.map_or(world, |p| out.alpha[p]));
         if let Some(parent) = body.parent {
             let eta_ddot = &out.modal[system.bodies[parent].modal_range()];
@@ -69,6 +83,10 @@ pub fn acceleration_outward(
                 out.hinge[body.velocity + i] = acceleration;
                 alpha += own.hinge.map[i] * acceleration;
             }
+        }
+        if let Role::Heads(index) = role {
+            follow_aggregate(system, pose, velocity, inertia, force, index, &alpha, out);
+            continue;
         }
         if let Some(index) = own.flexible {
             let (part, elimination) = (&pose.flexible[index], &inertia.flexible[index]);
@@ -91,4 +109,27 @@ pub fn acceleration_outward(
         }
         out.alpha[k] = alpha;
     }
+}
+
+/// Aggregate `index`, whose root's frame accelerates as `base` (Eq. 66 and 67).
+#[expect(clippy::too_many_arguments, reason = "a sweep step reads every earlier sweep")]
+fn follow_aggregate(
+    system: &System,
+    pose: &PoseScratch,
+    velocity: &VelocityScratch,
+    inertia: &InertiaScratch,
+    force: &ForceScratch,
+    index: usize,
+    base: &Vector6<f64>,
+    out: &mut AccelerationScratch,
+) {
+    let AccelerationScratch { alpha_plus, alpha, hinge, modal, aggregates } = out;
+    for member in &system.aggregates[index].members {
+        let range = system.bodies[member.body].velocity_range();
+        if system.bodies[member.body].hinge.is_prescribed() && !member.rates.is_empty() {
+            hinge[range.clone()].copy_from_slice(&velocity.prescribed[range]);
+        }
+    }
+    aggregates[index].follow(system, pose, Some(velocity), inertia, index, &force.aggregates[index].nu, base);
+    aggregates[index].scatter(system, index, hinge, modal, alpha_plus, alpha);
 }

@@ -3,13 +3,14 @@
 //! Reads: state, [`PoseScratch`], [`VelocityScratch`], [`InertiaScratch`]. Writes: [`ForceScratch`].
 //! Source: Paper Eq. 34 and 35. Cost: O(bodies + modes + loads).
 
-use super::inertia_inward::{InertiaScratch, solve_hinge};
+use super::inertia_inward::{FlexibleElimination, InertiaScratch, solve_hinge};
 use super::pose_outward::PoseScratch;
 use super::velocity_outward::VelocityScratch;
+use crate::dynamics::aggregate::force::{AggregateForce, filter_aggregate};
 use crate::dynamics::frame_motion::FramePose;
 use crate::dynamics::world::{WorldFrame, world_frames};
 use crate::model::hinge::MAX_RATES;
-use crate::model::{Body, HingeKind, Load, LoadAxes, LoadPoint, State, System};
+use crate::model::{Body, HingeKind, Load, LoadAxes, LoadPoint, Role, State, System};
 use crate::spatial::shift::{force_from, motion_to, rotate, rotate_back, spatial};
 use nalgebra::{Vector3, Vector6};
 
@@ -41,6 +42,8 @@ pub struct ForceScratch {
     pub nu_modal: Vec<f64>,
     /// Hinge forces of springs, dampers and motors, indexed like the hinge rates.
     pub applied: Vec<f64>,
+    /// One per aggregate.
+    pub aggregates: Vec<AggregateForce>,
     /// World frames of the bodies; empty unless a load is given in inertial axes.
     world: Vec<WorldFrame>,
     shape: Vec<Vector6<f64>>,
@@ -66,6 +69,7 @@ impl ForceScratch {
             external_modal: vec![0.0; if loaded || closed { system.modal_count } else { 0 }],
             nu_modal: vec![0.0; system.modal_count],
             applied: vec![0.0; system.velocity_count],
+            aggregates: system.aggregates.iter().map(AggregateForce::new).collect(),
             world: vec![WorldFrame::default(); if system.has_world_loads() { system.bodies.len() } else { 0 }],
             shape: vec![Vector6::zeros(); if loaded { system.largest_mode_count() } else { 0 }],
         }
@@ -88,9 +92,26 @@ pub fn force_inward(
     }
     for (k, body) in system.bodies.iter().enumerate().rev() {
         let own = &velocity.bodies[k];
-        let z_hinge = match pose.bodies[k].flexible {
-            None => out.bodies[k].z,
-            Some(index) => {
+        let z_hinge = match (system.role(k), pose.bodies[k].flexible) {
+            (Role::Member(_), _) => continue,
+            (Role::Heads(index), _) => {
+                let aggregate = &system.aggregates[index];
+                for member in &aggregate.members {
+                    if let Some(flexible) = pose.bodies[member.body].flexible {
+                        gather_innovations(system, state, pose, velocity, &inertia.flexible[flexible], member.body, out);
+                    }
+                }
+                let felt = filter_aggregate(system, pose, velocity, inertia, index, out);
+                if !aggregate.holds_root_modes {
+                    if let Some(root) = aggregate.root {
+                        out.bodies[root].z += felt;
+                    }
+                    continue;
+                }
+                felt
+            }
+            (Role::Own, None) => out.bodies[k].z,
+            (Role::Own, Some(index)) => {
                 let z = filter_modes(system, state, pose, velocity, inertia, k, index, out);
                 rotate_back(&pose.flexible[index].inboard.rotation, &z)
             }
@@ -130,26 +151,9 @@ fn filter_modes(
     index: usize,
     out: &mut ForceScratch,
 ) -> Vector6<f64> {
-    let body = &system.bodies[k];
-    let (range, part, elimination) = (body.modal_range(), &pose.flexible[index], &inertia.flexible[index]);
-    let nu = &mut out.nu_modal[range.clone()];
-
-    // epsilon = -z_m, gathered in place
-    if let Some(flexible) = body.flexible() {
-        flexible.elastic_force(&state.modal_position[range.clone()], &state.modal_velocity[range.clone()], nu);
-    }
-    for (nu, b) in nu.iter_mut().zip(&velocity.b_modal[range.clone()]) {
-        *nu = -(*nu + b);
-    }
-    if let Some(external) = out.external_modal.get(range.clone()) {
-        nu.iter_mut().zip(external).for_each(|(e, x)| *e += x);
-    }
-    for &child in &elimination.moved_children {
-        let child_pose = &pose.bodies[child];
-        let Some(start) = child_pose.shape else { continue };
-        let felt = rotate(&child_pose.rotation, &out.bodies[child].z_plus);
-        nu.iter_mut().zip(&pose.shape[start..]).for_each(|(e, s)| *e -= s.dot(&felt));
-    }
+    let (part, elimination) = (&pose.flexible[index], &inertia.flexible[index]);
+    gather_innovations(system, state, pose, velocity, elimination, k, out);
+    let nu = &mut out.nu_modal[system.bodies[k].modal_range()];
     let Some(root) = &elimination.root else {
         // a held root: B moves with O, and its bias enters through P_fr and P_rr, which hold the children
         let a = velocity.bodies[k].a_inboard;
@@ -168,6 +172,36 @@ fn filter_modes(
     out.bodies[k].alpha_free = alpha_free;
     out.bodies[k].alpha_inboard = free + velocity.bodies[k].a_inboard;
     -(root.P * out.bodies[k].alpha_inboard)
+}
+
+/// `epsilon = -z_m` of the modes of flexible body `k`, without what the bias of its hinge adds; left in `nu_modal`.
+fn gather_innovations(
+    system: &System,
+    state: &State,
+    pose: &PoseScratch,
+    velocity: &VelocityScratch,
+    elimination: &FlexibleElimination,
+    k: usize,
+    out: &mut ForceScratch,
+) {
+    let body = &system.bodies[k];
+    let range = body.modal_range();
+    let nu = &mut out.nu_modal[range.clone()];
+    if let Some(flexible) = body.flexible() {
+        flexible.elastic_force(&state.modal_position[range.clone()], &state.modal_velocity[range.clone()], nu);
+    }
+    for (nu, b) in nu.iter_mut().zip(&velocity.b_modal[range.clone()]) {
+        *nu = -(*nu + b);
+    }
+    if let Some(external) = out.external_modal.get(range) {
+        nu.iter_mut().zip(external).for_each(|(e, x)| *e += x);
+    }
+    for &child in &elimination.moved_children {
+        let child_pose = &pose.bodies[child];
+        let Some(start) = child_pose.shape else { continue };
+        let felt = rotate(&child_pose.rotation, &out.bodies[child].z_plus);
+        nu.iter_mut().zip(&pose.shape[start..]).for_each(|(e, s)| *e -= s.dot(&felt));
+    }
 }
 
 /// `sum_j x_j rows_j`.

@@ -13,9 +13,10 @@
 
 use super::pose_outward::PoseScratch;
 use crate::dynamics::DynamicsError;
+use crate::dynamics::aggregate::inertia::AggregateInertia;
 use crate::dynamics::modal_block::{ModalBlock, SingularBlock, outer_sum};
 use crate::model::hinge::MAX_RATES;
-use crate::model::{Body, BodyKind, HingeKind, System};
+use crate::model::{Body, BodyKind, HingeKind, Role, System};
 use crate::spatial::SpatialInertia;
 use crate::spatial::shift::{force_from, motion_to};
 use nalgebra::{Matrix6, Vector3, Vector6};
@@ -74,6 +75,10 @@ pub struct InertiaScratch {
     pub bodies: Vec<BodyInertia>,
     /// One per flexible body, in the order of [`PoseScratch::flexible`].
     pub flexible: Vec<FlexibleElimination>,
+    /// One per aggregate.
+    pub aggregates: Vec<AggregateInertia>,
+    /// Whether something was added to the mass matrix, so that a free hinge transmits forces.
+    pub with_added: bool,
 }
 
 /// What a linearly implicit integrator adds to the mass matrix.
@@ -99,8 +104,11 @@ impl InertiaScratch {
             D: [[0.0; MAX_RATES]; MAX_RATES],
         };
         let mut children = vec![Vec::new(); system.bodies.len()];
+        let inside = |k, parent| system.aggregates.iter().any(|a| a.member_of(k).is_some() && a.member_of(parent).is_some());
         for (k, body) in system.bodies.iter().enumerate() {
-            if let Some(parent) = body.parent.filter(|_| body.parent_side.moves()) {
+            if let Some(parent) = body.parent.filter(|_| body.parent_side.moves())
+                && !inside(k, parent)
+            {
                 children[parent].push(k);
             }
         }
@@ -116,7 +124,12 @@ impl InertiaScratch {
                 }
             })
         };
-        Self { bodies: vec![empty; system.bodies.len()], flexible: system.bodies.iter().enumerate().filter_map(eliminate).collect() }
+        Self {
+            bodies: vec![empty; system.bodies.len()],
+            flexible: system.bodies.iter().enumerate().filter_map(eliminate).collect(),
+            aggregates: system.aggregates.iter().map(AggregateInertia::new).collect(),
+            with_added: false,
+        }
     }
 }
 
@@ -138,6 +151,7 @@ pub fn inertia_inward_with(
     added: Option<&AddedInertia>,
     out: &mut InertiaScratch,
 ) -> Result<(), DynamicsError> {
+    out.with_added = added.is_some();
     for (k, body) in system.bodies.iter().enumerate() {
         out.bodies[k].P = match (&body.kind, pose.bodies[k].flexible) {
             (BodyKind::Rigid(inertia), _) => *inertia,
@@ -145,7 +159,21 @@ pub fn inertia_inward_with(
         };
     }
     for (k, body) in system.bodies.iter().enumerate().rev() {
-        if let Some(index) = pose.bodies[k].flexible {
+        let role = system.role(k);
+        if let Role::Member(_) = role {
+            continue;
+        }
+        if let Role::Heads(index) = role {
+            let felt = eliminate_aggregate(system, pose, index, added, out)?;
+            let aggregate = &system.aggregates[index];
+            if !aggregate.holds_root_modes {
+                if let Some(root) = aggregate.root {
+                    out.bodies[root].P = out.bodies[root].P.plus(&felt);
+                }
+                continue;
+            }
+            out.bodies[k].P_hinge = felt;
+        } else if let Some(index) = pose.bodies[k].flexible {
             let diagonal = added.map(|a| &a.modal[body.modal_range()]);
             eliminate_modes(pose, k, index, diagonal, out)
                 .map_err(|SingularBlock| DynamicsError::SingularModes { body: body.name.clone() })?;
@@ -171,6 +199,47 @@ pub fn inertia_inward_with(
     Ok(())
 }
 
+/// Aggregate `index` (Eq. 62): the inertia that its root's frame feels.
+fn eliminate_aggregate(
+    system: &System,
+    pose: &PoseScratch,
+    index: usize,
+    added: Option<&AddedInertia>,
+    out: &mut InertiaScratch,
+) -> Result<SpatialInertia, DynamicsError> {
+    let aggregate = &system.aggregates[index];
+    for member in &aggregate.members {
+        if let Some(flexible) = pose.bodies[member.body].flexible {
+            gather_rows(pose, flexible, out);
+        }
+    }
+    let InertiaScratch { bodies, flexible, aggregates, .. } = out;
+    aggregates[index].eliminate(system, pose, aggregate, &pose.embeddings[index], added, bodies, flexible).map_err(|singular| {
+        let (coordinate, body) = aggregate.name_of(system, singular.coordinate);
+        DynamicsError::SingularAggregate {
+            closures: aggregate.closure_names(system),
+            coordinate,
+            body,
+            inertia: singular.inertia,
+            scale: singular.scale,
+        }
+    })
+}
+
+/// `mu' = P_fr` of a flexible body: its own rows and what the children that its modes move add.
+fn gather_rows(pose: &PoseScratch, index: usize, out: &mut InertiaScratch) {
+    let FlexibleElimination { mu, moved_children, .. } = &mut out.flexible[index];
+    mu.copy_from_slice(&pose.flexible[index].inertia.row);
+    for &child in moved_children.iter() {
+        let own = &pose.bodies[child];
+        let S = &out.bodies[child].S;
+        let shape = own.shape.map_or(&[][..], |start| &pose.shape[start..start + mu.len()]);
+        for (mu, y) in mu.iter_mut().zip(shape) {
+            *mu += force_from(&own.l, &S.times(y));
+        }
+    }
+}
+
 /// Modes of flexible body `k`: `P_cr+ = P_rr - mu D_fl^-1 mu'` (Eq. 32), moved to O.
 fn eliminate_modes(
     pose: &PoseScratch,
@@ -180,16 +249,12 @@ fn eliminate_modes(
     out: &mut InertiaScratch,
 ) -> Result<(), SingularBlock> {
     let part = &pose.flexible[index];
+    gather_rows(pose, index, out);
     let FlexibleElimination { modal_block, mu, gain_modal, moved_children, root } = &mut out.flexible[index];
     modal_block.begin(diagonal);
-    mu.copy_from_slice(&part.inertia.row);
     for &child in moved_children.iter() {
-        let child_pose = &pose.bodies[child];
         let S = out.bodies[child].S;
-        let shape = child_pose.shape.map_or(&[][..], |start| &pose.shape[start..start + mu.len()]);
-        for (mu, y) in mu.iter_mut().zip(shape) {
-            *mu += force_from(&child_pose.l, &S.times(y));
-        }
+        let shape = pose.bodies[child].shape.map_or(&[][..], |start| &pose.shape[start..start + mu.len()]);
         modal_block.add_child(|Y| Y.copy_from_slice(shape), &S)?;
     }
     gain_modal.copy_from_slice(mu);
@@ -251,7 +316,7 @@ impl RootElimination {
 }
 
 /// Pivots at or below this multiple of what they were formed from are rounding, not inertia.
-const SINGULAR: f64 = 8.0 * f64::EPSILON;
+pub const SINGULAR: f64 = 8.0 * f64::EPSILON;
 
 /// Hinge of a body: `D = H P H*` and what is `added`, `G = P H* D^-1`, `P+ = P - G D G*` (Eq. 33). Errors: (rate, pivot, scale).
 fn eliminate_hinge(

@@ -1,8 +1,11 @@
 //! Pose sweep: where every O stands on its parent, the hinge maps, and the mode shapes there.
 //!
 //! Reads: state positions. Writes: [`PoseScratch`]. Source: Paper Eq. 26 (operators), DESIGN 2 (finite rotation).
+//! Closures and aggregates follow at the end, from the poses of their bodies.
 //! Cost: O(bodies + modes), plus O(modes^2) per flexible body for its inertia.
 
+use crate::dynamics::aggregate::Embedding;
+use crate::dynamics::closed_chain::constraint::ClosureAt;
 use crate::dynamics::flexible_inertia::FlexibleInertia;
 use crate::dynamics::frame_motion::FramePose;
 use crate::model::hinge::HingePose;
@@ -46,6 +49,10 @@ pub struct PoseScratch {
     pub flexible: Vec<FlexiblePose>,
     /// `Pi(O)` of every child that modes of its parent move: at O, carried by O+, in the parent's axes; one per mode of the parent.
     pub shape: Vec<Vector6<f64>>,
+    /// One per closure.
+    pub closures: Vec<ClosureAt>,
+    /// One per aggregate.
+    pub embeddings: Vec<Embedding>,
 }
 
 impl PoseScratch {
@@ -77,7 +84,13 @@ impl PoseScratch {
             }
             bodies.push(pose);
         }
-        Self { bodies, flexible, shape: vec![Vector6::zeros(); shapes] }
+        Self {
+            bodies,
+            flexible,
+            shape: vec![Vector6::zeros(); shapes],
+            closures: system.closures.iter().map(ClosureAt::new).collect(),
+            embeddings: system.aggregates.iter().map(Embedding::new).collect(),
+        }
     }
 
     /// Mode shape of child `k` on its parent; empty if no mode moves it.
@@ -87,31 +100,70 @@ impl PoseScratch {
     }
 }
 
+impl PoseScratch {
+    /// Residuals of all blocked directions (m or rad).
+    pub fn residuals(&self, system: &System, out: &mut [f64]) {
+        for (closure, at) in system.closures.iter().zip(&self.closures) {
+            out[closure.rows()].copy_from_slice(at.residual(closure));
+        }
+    }
+
+    /// Largest violation of closure `index` (m or rad).
+    #[must_use]
+    pub fn closure_residual(&self, system: &System, index: usize) -> f64 {
+        self.closures[index].residual(&system.closures[index]).iter().fold(0.0, |m, r| r.abs().max(m))
+    }
+
+    /// Keeps the independent coordinates of all aggregates as they are, or lets them be chosen again where they are ill.
+    pub fn hold_coordinates(&mut self, held: bool) {
+        self.embeddings.iter_mut().for_each(|e| e.held = held);
+    }
+}
+
 /// Fills `out` from the positions in `state`.
 pub fn pose_outward(system: &System, state: &State, out: &mut PoseScratch) {
-    let PoseScratch { bodies, flexible, shape } = out;
-    for (body, pose) in system.bodies.iter().zip(bodies.iter_mut()) {
-        body.hinge.kind.pose(&state.position[body.position_range()], &mut pose.hinge);
-
-        // O+ on the parent, then O through the hinge
-        let eta_parent = match body.parent {
-            Some(parent) if body.parent_side.moves() => &state.modal_position[system.bodies[parent].modal_range()],
-            _ => &[],
-        };
-        pose.outer = FramePose::of(&body.parent_side, eta_parent);
-        pose.rotation = pose.outer.rotation * pose.hinge.rotation;
-        pose.l = pose.outer.position + pose.outer.rotation * pose.hinge.translation;
-        if let Some(start) = pose.shape {
-            let shape = &mut shape[start..start + body.parent_side.mode_shape.len()];
-            pose.outer.shape_at(&body.parent_side, &pose.l, shape);
+    for (k, body) in system.bodies.iter().enumerate() {
+        place(system, state, k, out);
+        if let (BodyKind::Flexible(flexible), Some(index)) = (&body.kind, out.bodies[k].flexible) {
+            out.flexible[index].inertia.evaluate(&flexible.integrals, flexible.order, &state.modal_position[body.modal_range()]);
         }
-
-        if let (BodyKind::Flexible(body_flexible), Some(index)) = (&body.kind, pose.flexible) {
-            let (eta, own) = (&state.modal_position[body.modal_range()], &mut flexible[index]);
-            own.inboard = FramePose::of(&body_flexible.inboard, eta);
-            // Pi_B(O) = phi*(O, k) Pi(O): the frame's shape at the origin of B
-            own.inboard.shape_at(&body_flexible.inboard, &Vector3::zeros(), &mut own.shape_inboard);
-            own.inertia.evaluate(&body_flexible.integrals, body_flexible.order, eta);
+    }
+    if !system.closures.is_empty() {
+        let mut closures = std::mem::take(&mut out.closures);
+        for (closure, at) in system.closures.iter().zip(&mut closures) {
+            at.follow_pose(closure, system, state, out);
         }
+        let mut embeddings = std::mem::take(&mut out.embeddings);
+        for (aggregate, embedding) in system.aggregates.iter().zip(&mut embeddings) {
+            embedding.follow_pose(system, out, &closures, aggregate);
+        }
+        (out.closures, out.embeddings) = (closures, embeddings);
+    }
+}
+
+/// Pose of body `k` on its parent, and of its hinge on itself.
+pub fn place(system: &System, state: &State, k: usize, out: &mut PoseScratch) {
+    let PoseScratch { bodies, flexible, shape, .. } = out;
+    let (body, pose) = (&system.bodies[k], &mut bodies[k]);
+    body.hinge.kind.pose(&state.position[body.position_range()], &mut pose.hinge);
+
+    // O+ on the parent, then O through the hinge
+    let eta_parent = match body.parent {
+        Some(parent) if body.parent_side.moves() => &state.modal_position[system.bodies[parent].modal_range()],
+        _ => &[],
+    };
+    pose.outer = FramePose::of(&body.parent_side, eta_parent);
+    pose.rotation = pose.outer.rotation * pose.hinge.rotation;
+    pose.l = pose.outer.position + pose.outer.rotation * pose.hinge.translation;
+    if let Some(start) = pose.shape {
+        let shape = &mut shape[start..start + body.parent_side.mode_shape.len()];
+        pose.outer.shape_at(&body.parent_side, &pose.l, shape);
+    }
+
+    if let (BodyKind::Flexible(body_flexible), Some(index)) = (&body.kind, pose.flexible) {
+        let (eta, own) = (&state.modal_position[body.modal_range()], &mut flexible[index]);
+        own.inboard = FramePose::of(&body_flexible.inboard, eta);
+        // Pi_B(O) = phi*(O, k) Pi(O): the frame's shape at the origin of B
+        own.inboard.shape_at(&body_flexible.inboard, &Vector3::zeros(), &mut own.shape_inboard);
     }
 }

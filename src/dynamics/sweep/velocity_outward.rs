@@ -5,6 +5,7 @@
 #![expect(non_snake_case, reason = "symbols follow the table in dynamics/mod.rs")]
 
 use super::pose_outward::PoseScratch;
+use crate::dynamics::aggregate::embedding::EmbeddedBias;
 use crate::model::hinge::MAX_RATES;
 use crate::model::{BodyKind, State, System};
 use crate::spatial::shift::{angular, linear, motion_to, rotate, rotate_back, spatial};
@@ -34,6 +35,10 @@ pub struct VelocityScratch {
     pub b_modal: Vec<f64>,
     /// Accelerations of prescribed hinges, indexed like the hinge rates; zero for the others.
     pub prescribed: Vec<f64>,
+    /// What the rates alone make of the closures' accelerations, one per blocked direction.
+    pub closure_bias: Vec<f64>,
+    /// One per aggregate.
+    pub embedded: Vec<EmbeddedBias>,
 }
 
 impl VelocityScratch {
@@ -44,6 +49,8 @@ impl VelocityScratch {
             bodies: vec![BodyVelocity::default(); system.bodies.len()],
             b_modal: vec![0.0; system.modal_count],
             prescribed: vec![0.0; system.velocity_count],
+            closure_bias: vec![0.0; system.closure_rows()],
+            embedded: system.aggregates.iter().map(EmbeddedBias::new).collect(),
         }
     }
 }
@@ -111,5 +118,17 @@ pub fn velocity_outward(system: &System, state: &State, pose: &PoseScratch, out:
             }
         }
         out.bodies[k] = result;
+    }
+    if !system.closures.is_empty() {
+        let mut bias = std::mem::take(&mut out.closure_bias);
+        for (closure, at) in system.closures.iter().zip(&pose.closures) {
+            at.bias(closure, system, state, |k| out.bodies[k].V, &mut bias[closure.rows()]);
+        }
+        out.closure_bias = bias;
+        let mut embedded = std::mem::take(&mut out.embedded);
+        for (index, own) in embedded.iter_mut().enumerate() {
+            own.follow_rates(system, pose, out, index);
+        }
+        out.embedded = embedded;
     }
 }

@@ -1,0 +1,65 @@
+//! Closures that are embedded in aggregates, as the rest of an evaluation sees them: closed, free of contradiction, and loaded.
+
+use super::ClosedChain;
+use crate::dynamics::DynamicsError;
+use crate::dynamics::sweep::acceleration_outward::AccelerationScratch;
+use crate::dynamics::sweep::force_inward::ForceScratch;
+use crate::dynamics::sweep::inertia_inward::InertiaScratch;
+use crate::dynamics::sweep::pose_outward::PoseScratch;
+use crate::dynamics::sweep::velocity_outward::VelocityScratch;
+use crate::model::{State, System};
+
+/// Share of the closures' accelerations that may lie where no coordinate reaches before they are said to contradict one another:
+/// closures assembled to 1e-10 leave less, and motions that no loop allows leave all.
+const CONTRADICTION: f64 = 1e-6;
+
+/// Refuses aggregates whose loops lose rank, or whose closures and prescribed motions contradict one another, after the velocity sweep.
+///
+/// # Errors
+/// Naming the closure.
+pub fn check_embedded(system: &System, pose: &PoseScratch, velocity: &VelocityScratch) -> Result<(), DynamicsError> {
+    for ((aggregate, embedding), bias) in system.aggregates.iter().zip(&pose.embeddings).zip(&velocity.embedded) {
+        let rows = || aggregate.closures.iter().flat_map(|&c| system.closures[c].rows().map(move |_| c)).enumerate();
+        let share = |row: usize| embedding.redundancy(row);
+        let worst = || rows().max_by(|a, b| share(a.0).total_cmp(&share(b.0))).map_or(0, |(_, c)| c);
+        if embedding.is_lost() {
+            return Err(DynamicsError::ChangePoint { closure: system.closures[worst()].name.clone() });
+        }
+        let [missed, size] = bias.missed;
+        if missed > CONTRADICTION * size {
+            return Err(DynamicsError::ContradictoryClosures {
+                closure: system.closures[worst()].name.clone(),
+                rank: embedding.rank(),
+                rows: embedding.rows(),
+            });
+        }
+    }
+    Ok(())
+}
+
+impl ClosedChain {
+    /// Moves the dependent coordinates and rates of all aggregates until their closures close.
+    ///
+    /// # Errors
+    /// If no state nearby closes.
+    pub fn close_aggregates(&mut self, system: &System, state: &mut State, pose: &mut PoseScratch) -> Result<(), DynamicsError> {
+        self.closings.iter_mut().enumerate().try_for_each(|(index, closing)| closing.close(system, state, pose, index))
+    }
+
+    /// Multipliers of embedded closures and the loads inside aggregates, inner aggregates first.
+    #[expect(clippy::too_many_arguments, reason = "a sweep step reads every earlier sweep")]
+    pub fn recover_embedded(
+        &mut self,
+        system: &System,
+        state: &State,
+        pose: &PoseScratch,
+        velocity: &VelocityScratch,
+        inertia: &InertiaScratch,
+        acceleration: &AccelerationScratch,
+        force: &mut ForceScratch,
+    ) {
+        for &index in &self.inner_first {
+            self.loads[index].recover(system, state, pose, velocity, inertia, acceleration, index, force, &mut self.lambda);
+        }
+    }
+}
