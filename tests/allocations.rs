@@ -97,7 +97,7 @@ fn steps_of_the_linearly_implicit_method_allocate_nothing() {
 #[test]
 fn evaluations_with_closures_allocate_nothing() {
     for (seed, method) in (0..20).flat_map(|seed| METHODS.map(|method| (seed, method))) {
-        let definition = held_by(random_loops(seed, &Recipe { bodies: 12, ..Recipe::default() }, 2), method);
+        let definition = held_by(method, random_loops(seed, &Recipe { bodies: 12, ..Recipe::default() }, 2));
         let (system, mut state) = definition.build().unwrap();
         let mut workspace = Workspace::new(&system);
         // closures that contradict one another are refused, and by a message that allocates

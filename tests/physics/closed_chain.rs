@@ -16,7 +16,7 @@ use pliant::model::build_closure::ClosureDefinition;
 use pliant::model::modal_body::Boundary;
 use pliant::model::{ClosureJoint, State, System, TimeFunction};
 
-fn evaluated(system: &System, state: &State) -> Workspace {
+pub fn evaluated(system: &System, state: &State) -> Workspace {
     let mut workspace = Workspace::new(system);
     forward_dynamics(system, state, &mut workspace).unwrap();
     workspace
@@ -27,7 +27,7 @@ fn accelerations(workspace: &Workspace) -> Vec<f64> {
 }
 
 /// A closure at the points `at_a`, `at_b`.
-fn closure(name: &str, kind: &str, axes: &[[f64; 3]], a: &str, at_a: [f64; 3], b: &str, at_b: [f64; 3]) -> ClosureDefinition {
+pub fn closure(name: &str, kind: &str, axes: &[[f64; 3]], a: &str, at_a: [f64; 3], b: &str, at_b: [f64; 3]) -> ClosureDefinition {
     let frame = |x: [f64; 3]| Frame { position: Vector3::from(x), ..Frame::default() };
     ClosureDefinition {
         name: name.into(),
@@ -57,9 +57,9 @@ fn every_method_agrees_with_the_dense_kkt_solve_and_passes_the_audit() {
         for seed in 0..28 {
             let definition = random_loops(1000 + 100 * r as u64 + seed, recipe, 1 + seed as usize % 3);
             // cut, embedded, and the first one embedded beside cut ones
-            let mut mixed = held_by(definition.clone(), METHODS[0]);
+            let mut mixed = held_by(METHODS[0], definition.clone());
             mixed.closures[0].method = Some(METHODS[1].into());
-            let methods = [held_by(definition.clone(), METHODS[0]), held_by(definition, METHODS[1]), mixed];
+            let methods = [held_by(METHODS[0], definition.clone()), held_by(METHODS[1], definition), mixed];
             let mut reference: Option<Vec<Vector6<f64>>> = None;
             for (method, definition) in methods.iter().enumerate() {
                 let name = format!("recipe {r} seed {seed} method {method}");
@@ -124,7 +124,7 @@ fn every_method_agrees_with_the_dense_kkt_solve_and_passes_the_audit() {
 }
 
 /// Uniform rod along x.
-fn rod(name: &str, length: f64) -> BodyDefinition {
+pub fn rod(name: &str, length: f64) -> BodyDefinition {
     let j = length.powi(3) / 12.0;
     rigid(name, length, [0.5 * length, 0.0, 0.0], [0.0, j, j])
 }

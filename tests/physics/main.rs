@@ -13,5 +13,6 @@ mod identities;
 mod nodal_sums;
 mod published;
 mod published_flexible;
+mod published_loops;
 mod scaling;
 mod stiff;

@@ -13,12 +13,12 @@ use pliant::spatial::rotation;
 use rand::rngs::StdRng;
 use rand::{Rng, SeedableRng};
 
-/// Methods that hold closures.
+/// Every method that holds closures, by the name that scenes use: tests of loops run with each.
 pub const METHODS: [&str; 2] = ["tree_augmented", "constraint_embedding"];
 
-/// The same definition with all closures held by `method`.
-pub fn held_by(mut definition: Definition, method: &str) -> Definition {
-    definition.closures.iter_mut().for_each(|c| c.method = Some(method.to_owned()));
+/// The same system with all its closures held by `method`.
+pub fn held_by(method: &str, mut definition: Definition) -> Definition {
+    definition.closures.iter_mut().for_each(|c| c.method = Some(method.into()));
     definition
 }
 
