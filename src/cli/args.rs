@@ -57,7 +57,7 @@ pub struct SceneArguments {
     /// Integrate with this method instead of the scene's: auto, dormand_prince, rosenbrock_w or rk4
     #[arg(long, value_name = "NAME")]
     pub integrator: Option<String>,
-    /// Hold all closures by this method instead of the scene's: auto or tree_augmented
+    /// Hold all closures by this method instead of the scene's: auto, tree_augmented or constraint_embedding
     #[arg(long, value_name = "NAME")]
     pub closure_method: Option<String>,
     /// Retain the lowest N modes of every flexible body

@@ -97,7 +97,7 @@ impl ClosedChain {
     fn contradiction(&self, system: &System) -> DynamicsError {
         let share = |i: usize| {
             let own = system.closures[i].rows();
-            let rows = self.cut.iter().enumerate().filter(|(_, row)| own.contains(row));
+            let rows = self.cut.iter().enumerate().filter(|(_, row)| own.contains(*row));
             rows.map(|(c, _)| self.schur.redundancy(c)).fold(0.0, f64::max)
         };
         let worst = (0..system.closures.len()).max_by(|&i, &j| share(i).total_cmp(&share(j))).unwrap_or(0);
