@@ -159,6 +159,7 @@ fn plan(scene: &Scene, _picture: bool) -> Result<OutputPlan, Failure> {
         scene_name: scene.name.clone(),
         scene_text: scene.source.text.clone(),
         hinges: scene.hinges.clone(),
+        closures: scene.closures.clone(),
         monitors: scene.monitors.clone(),
         deformation_scale: scene.deformation_scale,
         audit: scene.audit,

@@ -1,14 +1,16 @@
 //! Names, units, frames, points and sides of everything that is put out. Results file, viewer and documentation read them here.
 
 use super::plan::OutputPlan;
-use crate::model::{Body, HingeKind, System};
+use crate::model::closure::HingeCoordinate;
+use crate::model::{Body, Closure, ClosureJoint, ClosureKind, ClosureSide, HingeKind, System};
+use crate::scene::closures::gear_unit;
 
 /// What one channel is.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Channel {
-    /// What it belongs to: "hinges", "bodies", "energy" or "audit"; empty for the time.
+    /// What it belongs to: "hinges", "closures", "bodies", "energy" or "audit"; empty for the time.
     pub group: &'static str,
-    /// Name of the hinge or body; empty if the group has only one.
+    /// Name of the hinge, closure or body; empty if the group has only one.
     pub owner: String,
     /// Name of the quantity.
     pub quantity: &'static str,
@@ -72,6 +74,60 @@ pub fn load_frame(body: &Body) -> String {
     format!("O of hinge {} (child side)", body.hinge.name)
 }
 
+/// Point about which moments of closures are taken, and at which their forces act.
+pub const CLOSURE_POINT: &str = "origin of frame b";
+
+fn closure_body<'s>(system: &'s System, side: &ClosureSide) -> &'s str {
+    side.body.map_or("world", |k| system.bodies[k].name.as_str())
+}
+
+/// "coordinate 1 of HINGE".
+fn coordinate_name(system: &System, coordinate: &HingeCoordinate) -> String {
+    let body = &system.bodies[coordinate.body];
+    format!("coordinate {} of {}", coordinate.position - body.position + 1, body.hinge.name)
+}
+
+/// "by BODY A on BODY B"; of a gear "by coordinate 1 of HINGE A on coordinate 1 of HINGE B".
+#[must_use]
+pub fn closure_side(system: &System, closure: &Closure) -> String {
+    match &closure.joint {
+        ClosureJoint::Frames { a, b, .. } => format!("by {} on {}", closure_body(system, a), closure_body(system, b)),
+        ClosureJoint::Gear { a, b, .. } => format!("by {} on {}", coordinate_name(system, a), coordinate_name(system, b)),
+    }
+}
+
+/// Frame of the load of a closure; a gear has none.
+#[must_use]
+pub fn closure_frame(system: &System, closure: &Closure) -> Option<String> {
+    let ClosureJoint::Frames { a, .. } = &closure.joint else { return None };
+    Some(format!("frame a of closure {} (on {})", closure.name, closure_body(system, a)))
+}
+
+/// Unit of the residual of a closure, the largest of its kind's violations.
+#[must_use]
+pub fn residual_unit(system: &System, closure: &Closure) -> &'static str {
+    match (&closure.joint, gear_unit(system, closure)) {
+        (ClosureJoint::Frames { kind: ClosureKind::Spherical, .. }, _) | (ClosureJoint::Gear { .. }, Some("N")) => "m",
+        (ClosureJoint::Frames { .. }, _) => "m or rad",
+        (ClosureJoint::Gear { .. }, _) => "rad",
+    }
+}
+
+fn closure_channels(system: &System, closure: &Closure, out: &mut Vec<Channel>) {
+    let new = |quantity, width, unit: &str| Channel::new("closures", &closure.name, quantity, width, unit);
+    let side = Some(closure_side(system, closure));
+    match gear_unit(system, closure) {
+        Some(unit) => out.push(Channel { side, ..new("coordinate_force", None, unit) }),
+        None => {
+            for (quantity, unit) in [("load_moment", "N m"), ("load_force", "N")] {
+                let (frame, point, side) = (closure_frame(system, closure), Some(CLOSURE_POINT.into()), side.clone());
+                out.push(Channel { frame, point, side, ..new(quantity, Some(3), unit).components("x, y, z") });
+            }
+        }
+    }
+    out.push(new("residual", None, residual_unit(system, closure)));
+}
+
 fn hinge_channels(system: &System, body: &Body, out: &mut Vec<Channel>) {
     let (name, kind) = (&body.hinge.name, &body.hinge.kind);
     let new = |quantity, width, unit: String| Channel::new("hinges", name, quantity, Some(width), unit);
@@ -110,6 +166,7 @@ fn body_channels(body: &Body, stress: bool, out: &mut Vec<Channel>) {
 pub fn result_channels(system: &System, plan: &OutputPlan) -> Vec<Channel> {
     let mut channels = vec![Channel::new("", "", "time", None, "s")];
     plan.hinges.iter().for_each(|&k| hinge_channels(system, &system.bodies[k], &mut channels));
+    plan.closures.iter().for_each(|&i| closure_channels(system, &system.closures[i], &mut channels));
     for &k in &system.definition_order {
         let stress = plan.surfaces.iter().any(|s| s.body == k && s.stress);
         body_channels(&system.bodies[k], stress, &mut channels);

@@ -2,12 +2,13 @@
 //!
 //! Hinges and bodies come in the order in which the scene defines them. Numbers are printed so that they read back to the same f64.
 
+use super::closure_load::{ClosureGauge, ClosureRecord};
 use crate::dynamics::energy::balance;
 use crate::dynamics::hinge_load::hinge_load;
 use crate::dynamics::inverse::NewtonEuler;
 use crate::dynamics::world::WorldFrame;
 use crate::dynamics::{DynamicsError, Workspace, forward_dynamics};
-use crate::model::{Closure, ClosureJoint, State, System};
+use crate::model::{State, System};
 use crate::spatial::shift::{angular, linear};
 use nalgebra::Vector6;
 use serde::ser::{Serialize, SerializeMap, Serializer};
@@ -103,13 +104,12 @@ pub struct ClosureEvaluation {
 }
 
 fn closures(system: &System, workspace: &Workspace) -> Named<ClosureEvaluation> {
-    let Some(chain) = &workspace.closed else { return Named::default() };
-    let record = |(index, closure): (usize, &Closure)| {
-        let coordinate_force = matches!(closure.joint, ClosureJoint::Gear { .. }).then(|| chain.lambda[closure.first_row]);
-        let load = workspace.closure_load(system, index).into();
-        (closure.name.clone(), ClosureEvaluation { load, coordinate_force, residual: workspace.pose.closure_residual(system, index) })
+    let record = |index: usize| {
+        let ClosureRecord { load, residual } = ClosureGauge::new(system, index).read(system, workspace);
+        let record = ClosureEvaluation { load: load.spatial().into(), coordinate_force: load.coordinate_force(), residual };
+        (system.closures[index].name.clone(), record)
     };
-    system.closures.iter().enumerate().map(record).collect()
+    (0..system.closures.len()).map(record).collect()
 }
 
 /// Energies (J).

@@ -1,5 +1,6 @@
 //! What all outputs of one output time share, evaluated once.
 
+use super::closure_load::{ClosureGauge, ClosureRecord};
 use super::plan::OutputPlan;
 use super::surface::StressPeak;
 use crate::dynamics::energy::{Energy, Momentum, balance};
@@ -15,6 +16,8 @@ use nalgebra::Vector6;
 pub struct OutputFrame {
     /// Loads at the plan's loaded hinges: (moment N m about O; force N), by the parent on the child, O axes.
     pub loads: Vec<Vector6<f64>>,
+    /// The plan's loaded closures.
+    pub closures: Vec<ClosureRecord>,
     /// World poses of the recursion's frames, one per body.
     pub frames: Vec<WorldFrame>,
     /// J.
@@ -33,6 +36,7 @@ pub struct OutputFrame {
 #[derive(Debug, Clone)]
 pub struct FrameEvaluator {
     hinges: Vec<usize>,
+    closures: Vec<ClosureGauge>,
     audit: Option<NewtonEuler>,
     /// The last frame.
     pub frame: OutputFrame,
@@ -43,8 +47,10 @@ impl FrameEvaluator {
     #[must_use]
     pub fn new(system: &System, plan: &OutputPlan) -> Self {
         let hinges = plan.loaded_hinges();
+        let closures: Vec<_> = plan.loaded_closures().into_iter().map(|i| ClosureGauge::new(system, i)).collect();
         let frame = OutputFrame {
             loads: vec![Vector6::zeros(); hinges.len()],
+            closures: closures.iter().map(ClosureGauge::nothing).collect(),
             frames: vec![WorldFrame::default(); system.bodies.len()],
             energy: Energy::default(),
             momentum: Momentum::default(),
@@ -52,15 +58,18 @@ impl FrameEvaluator {
             audit: None,
             closure: None,
         };
-        Self { hinges, audit: plan.audit.then(|| NewtonEuler::new(system)), frame }
+        Self { hinges, closures, audit: plan.audit.then(|| NewtonEuler::new(system)), frame }
     }
 
     /// Evaluates the frame of `sample`.
     pub fn evaluate(&mut self, plan: &OutputPlan, sample: &Sample<'_>) {
-        let Self { hinges, audit, frame } = self;
+        let Self { hinges, closures, audit, frame } = self;
         let Sample { system, state, workspace, .. } = *sample;
         for (load, &body) in frame.loads.iter_mut().zip(hinges.iter()) {
             *load = hinge_load(workspace, body);
+        }
+        for (record, gauge) in frame.closures.iter_mut().zip(closures.iter()) {
+            *record = gauge.read(system, workspace);
         }
         (frame.energy, frame.momentum) = balance(system, state, workspace, &mut frame.frames);
         for (peak, surface) in frame.stress.iter_mut().zip(&plan.surfaces) {

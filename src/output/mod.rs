@@ -4,6 +4,7 @@
 //! the tracker and the writers. Names and units are those of [`channels`]. Nothing here prints.
 
 pub mod channels;
+pub mod closure_load;
 pub mod evaluation;
 pub mod frame;
 pub mod picture;

@@ -51,6 +51,8 @@ pub struct OutputPlan {
     pub modal_files: Vec<ModalFileRecord>,
     /// Bodies at whose inboard hinge the load is an output, in the order of the outputs.
     pub hinges: Vec<usize>,
+    /// Closures whose load is an output, in the order of the outputs.
+    pub closures: Vec<usize>,
     /// Flexible bodies that are drawn or searched for stress.
     pub surfaces: Vec<BodySurface>,
     /// Boxes of rigid bodies; a rigid body without one is drawn as the cuboid of equal mass and inertia.
@@ -70,6 +72,7 @@ impl Default for OutputPlan {
             scene_text: String::new(),
             modal_files: Vec::new(),
             hinges: Vec::new(),
+            closures: Vec::new(),
             surfaces: Vec::new(),
             boxes: Vec::new(),
             monitors: Vec::new(),
@@ -88,6 +91,14 @@ pub enum PlanError {
         /// Index asked for.
         body: usize,
         /// Number of bodies.
+        count: usize,
+    },
+    /// An index without a closure.
+    #[error("output of closure {closure}, but the system has {count} closures; name a closure of the scene")]
+    NoClosure {
+        /// Index asked for.
+        closure: usize,
+        /// Number of closures.
         count: usize,
     },
     /// A surface that does not fit its body.
@@ -136,6 +147,13 @@ impl OutputPlan {
         for &body in self.hinges.iter().chain(self.boxes.iter().map(|b| &b.body)) {
             name(body)?;
         }
+        let closure_name = |closure: usize| {
+            let count = system.closures.len();
+            system.closures.get(closure).map(|c| c.name.as_str()).ok_or(PlanError::NoClosure { closure, count })
+        };
+        for &closure in &self.closures {
+            closure_name(closure)?;
+        }
         for surface in &self.surfaces {
             let (body, expected) = (name(surface.body)?, system.bodies[surface.body].mode_count());
             let found = surface.surface.displacement.len();
@@ -173,27 +191,27 @@ impl OutputPlan {
             Monitor::Hinge { body, .. } => Some(body),
             Monitor::Body { .. } => None,
         });
-        let mut bodies = Vec::new();
-        for body in self.hinges.iter().copied().chain(monitored) {
-            if !bodies.contains(&body) {
-                bodies.push(body);
-            }
-        }
-        bodies
+        each_once(self.hinges.iter().copied().chain(monitored))
+    }
+
+    /// Closures whose load is evaluated.
+    #[must_use]
+    pub fn loaded_closures(&self) -> Vec<usize> {
+        self.closures.clone()
     }
 
     /// Limits of moment (N m) and force (N) at the hinge of `body`, the tightest of each.
     #[must_use]
     pub fn hinge_limits(&self, body: usize) -> (Option<f64>, Option<f64>) {
-        let mut limits = (None, None);
-        for monitor in &self.monitors {
-            if let Monitor::Hinge { body: b, moment_limit, force_limit } = *monitor
-                && b == body
-            {
-                limits = (tighter(limits.0, moment_limit), tighter(limits.1, force_limit));
-            }
-        }
-        limits
+        self.tightest(|monitor| match *monitor {
+            Monitor::Hinge { body: b, moment_limit, force_limit } if b == body => Some((moment_limit, force_limit)),
+            _ => None,
+        })
+    }
+
+    fn tightest(&self, limits: impl Fn(&Monitor) -> Option<(Option<f64>, Option<f64>)>) -> (Option<f64>, Option<f64>) {
+        let found = self.monitors.iter().filter_map(limits);
+        found.fold((None, None), |(moment, force), (m, f)| (tighter(moment, m), tighter(force, f)))
     }
 
     /// Limit of the stress of `body` (Pa), the tightest.
@@ -204,6 +222,16 @@ impl OutputPlan {
             _ => limit,
         })
     }
+}
+
+fn each_once(indices: impl Iterator<Item = usize>) -> Vec<usize> {
+    let mut found = Vec::new();
+    for index in indices {
+        if !found.contains(&index) {
+            found.push(index);
+        }
+    }
+    found
 }
 
 fn tighter(a: Option<f64>, b: Option<f64>) -> Option<f64> {

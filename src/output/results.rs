@@ -66,6 +66,14 @@ impl ResultsWriter {
             row.extend_from_slice(&workspace.acceleration.hinge[body.velocity_range()]);
             row.extend(load.iter());
         }
+        // as those of its closures do
+        for (_, record) in plan.closures.iter().zip(&frame.closures) {
+            match record.load.coordinate_force() {
+                Some(force) => row.push(force),
+                None => row.extend(record.load.spatial().iter()),
+            }
+            row.push(record.residual);
+        }
         for &k in &system.definition_order {
             let body = &system.bodies[k];
             let pose = frame.frames[k].body_frame(body);

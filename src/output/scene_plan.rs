@@ -58,6 +58,7 @@ pub fn plan(scene: &Scene, picture: bool) -> Result<OutputPlan, ModalFileError> 
         scene_text: scene.source.text.clone(),
         modal_files,
         hinges: scene.hinges.clone(),
+        closures: scene.closures.clone(),
         surfaces,
         boxes: scene.boxes.iter().enumerate().filter_map(box_of).collect(),
         monitors: scene.monitors.clone(),

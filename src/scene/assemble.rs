@@ -1,5 +1,6 @@
 //! A scene file to a [`Scene`]: the system, its initial state, and what a run of it shall do.
 
+use super::closures::closure_index;
 use super::error::{SceneError, Source};
 use super::functions::function;
 use super::locate::{Step, first_not_finite};
@@ -69,6 +70,8 @@ pub struct Scene {
     pub rate_hz: f64,
     /// Bodies whose hinge loads are output.
     pub hinges: Vec<usize>,
+    /// Closures whose loads are output.
+    pub closures: Vec<usize>,
     /// Bodies whose stress is evaluated.
     pub stress: Vec<usize>,
     /// Whether output times are audited.
@@ -135,6 +138,10 @@ pub fn assemble(source: Source, overrides: &Overrides) -> Result<Scene, SceneErr
         None => system.definition_order.clone(),
         Some(names) => names_to_indices(names, "hinges", "hinge", |n| system.hinge_index(n), &source)?,
     };
+    let closures = match &spec.output.closures {
+        None => (0..system.closures.len()).collect(),
+        Some(names) => names_to_indices(names, "closures", "closure", |n| closure_index(&system, n), &source)?,
+    };
     let stress = match &spec.output.stress {
         None => system.definition_order.iter().copied().filter(|&k| system.bodies[k].mode_count() > 0).collect(),
         Some(names) => names_to_indices(names, "stress", "body", |n| system.body_index(n), &source)?,
@@ -144,7 +151,7 @@ pub fn assemble(source: Source, overrides: &Overrides) -> Result<Scene, SceneErr
     for (body, &k) in spec.body.iter().zip(&system.definition_order) {
         boxes[k] = body.box_size;
     }
-    describe_left_out(&spec, &system, &hinges, &mut left_out);
+    describe_left_out(&spec, &system, [hinges.len(), closures.len()], &mut left_out);
     let name =
         spec.name.clone().unwrap_or_else(|| source.path.file_stem().map_or_else(|| "scene".into(), |s| s.to_string_lossy().into_owned()));
     #[cfg(feature = "hdf5")]
@@ -158,6 +165,7 @@ pub fn assemble(source: Source, overrides: &Overrides) -> Result<Scene, SceneErr
         duration,
         rate_hz: spec.output.rate_hz,
         hinges,
+        closures,
         stress,
         audit: spec.output.audit,
         monitors,
@@ -209,8 +217,12 @@ fn names_to_indices(
     source: &Source,
 ) -> Result<Vec<usize>, SceneError> {
     let steps = |i| [Step::Key("output"), Step::Key(key), Step::Index(i)];
-    let index =
-        |(i, name): (usize, &String)| find(name).ok_or_else(|| source.value(&steps(i), format!("\"{name}\" is not a {what} of the scene")));
+    let index = |(i, name): (usize, &String)| {
+        if names[..i].contains(name) {
+            return Err(source.value(&steps(i), format!("\"{name}\" is named twice; name it once")));
+        }
+        find(name).ok_or_else(|| source.value(&steps(i), format!("\"{name}\" is not a {what} of the scene")))
+    };
     names.iter().enumerate().map(index).collect()
 }
 
@@ -221,16 +233,17 @@ fn monitor(index: usize, spec: &MonitorSpec, system: &System, source: &Source) -
             return Err(source.value(&at(key), format!("{limit} must be positive; it is a limit on a magnitude")));
         }
     }
+    let MonitorSpec { moment_limit, force_limit, stress_limit, .. } = *spec;
     match (&spec.hinge, &spec.body) {
-        (Some(name), None) if spec.stress_limit.is_none() => {
+        (Some(name), None) if stress_limit.is_none() => {
             let body =
                 system.hinge_index(name).ok_or_else(|| source.value(&at("hinge"), format!("\"{name}\" is not a hinge of the scene")))?;
-            Ok(Monitor::Hinge { body, moment_limit: spec.moment_limit, force_limit: spec.force_limit })
+            Ok(Monitor::Hinge { body, moment_limit, force_limit })
         }
-        (None, Some(name)) if spec.moment_limit.is_none() && spec.force_limit.is_none() => {
+        (None, Some(name)) if moment_limit.is_none() && force_limit.is_none() => {
             let body = system.body_index(name).filter(|&k| system.bodies[k].flexible().is_some());
             let body = body.ok_or_else(|| source.value(&at("body"), format!("\"{name}\" is not a flexible body of the scene")))?;
-            Ok(Monitor::Body { body, stress_limit: spec.stress_limit })
+            Ok(Monitor::Body { body, stress_limit })
         }
         _ => Err(source.value(
             &[Step::Key("monitor"), Step::Index(index)],
@@ -239,7 +252,8 @@ fn monitor(index: usize, spec: &MonitorSpec, system: &System, source: &Source) -
     }
 }
 
-fn describe_left_out(spec: &SceneSpec, system: &System, hinges: &[usize], left_out: &mut Vec<String>) {
+/// `loaded` are the numbers of hinges and closures whose loads are output.
+fn describe_left_out(spec: &SceneSpec, system: &System, loaded: [usize; 2], left_out: &mut Vec<String>) {
     if system.modal_count == 0 {
         left_out.push("modes (no flexible body)".into());
     }
@@ -249,8 +263,11 @@ fn describe_left_out(spec: &SceneSpec, system: &System, hinges: &[usize], left_o
     if system.loads.is_empty() {
         left_out.push("external loads".into());
     }
-    if hinges.len() < system.bodies.len() {
-        left_out.push(format!("loads at {} of {} hinges", system.bodies.len() - hinges.len(), system.bodies.len()));
+    let all = [(system.bodies.len(), "hinges"), (system.closures.len(), "closures")];
+    for ((count, what), loaded) in all.into_iter().zip(loaded) {
+        if loaded < count {
+            left_out.push(format!("loads at {} of {count} {what}", count - loaded));
+        }
     }
     if !spec.output.audit {
         left_out.push("load audit".into());

@@ -5,7 +5,23 @@ use super::locate::Step;
 use super::spec::{ClosureSpec, FrameSpec};
 use crate::model::build::Frame;
 use crate::model::build_closure::ClosureDefinition;
+use crate::model::{Closure, ClosureJoint, System};
 use nalgebra::Vector3;
+
+/// Index of the closure of that name.
+#[must_use]
+pub fn closure_index(system: &System, name: &str) -> Option<usize> {
+    system.closures.iter().position(|c| c.name == name)
+}
+
+/// Unit of what a gear exerts on its coordinate b, "N m" on an angle or "N" on a travel; none for a joint between frames.
+#[must_use]
+pub fn gear_unit(system: &System, closure: &Closure) -> Option<&'static str> {
+    let ClosureJoint::Gear { b, .. } = &closure.joint else { return None };
+    let body = &system.bodies[b.body];
+    let rate_unit = body.hinge.kind.rate_units()[b.velocity - body.velocity];
+    Some(if rate_unit == "m/s" { "N" } else { "N m" })
+}
 
 /// Closure `index` of the scene; `method` is the command line's.
 ///

@@ -330,6 +330,8 @@ pub struct OutputSpec {
     pub rate_hz: f64,
     /// Hinges whose loads are output; all if none.
     pub hinges: Option<Vec<String>>,
+    /// Closures whose loads are output; all if none.
+    pub closures: Option<Vec<String>>,
     /// Bodies whose stress is evaluated; all that have stress modes if none.
     pub stress: Option<Vec<String>>,
     /// Whether every output time is audited by the Newton-Euler sweep.
@@ -347,7 +349,7 @@ const fn yes() -> bool {
 
 impl Default for OutputSpec {
     fn default() -> Self {
-        Self { rate_hz: rate_hz(), hinges: None, stress: None, audit: true }
+        Self { rate_hz: rate_hz(), hinges: None, closures: None, stress: None, audit: true }
     }
 }
 

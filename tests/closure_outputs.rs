@@ -1,0 +1,206 @@
+//! Loads of closures over time: the results file against the evaluation, the closing report and closed solutions.
+#![cfg(feature = "hdf5")]
+
+use pliant::integrate::{Settings, Summary, simulate};
+use pliant::output::{Evaluation, OutputPlan, OutputSet, RunReport, scene_plan};
+use pliant::scene::error::Source;
+use pliant::scene::{Overrides, Scene, assemble};
+use std::error::Error;
+use std::f64::consts::PI;
+use std::path::Path;
+use std::time::Duration;
+
+type Tested = Result<(), Box<dyn Error>>;
+
+/// Beside the four-bar: a motor turns a wheel, which drives another by a cable and a slide by a rack.
+const GEARS: &str = r#"
+[[body]]
+name = "wheel"
+mass = 1.0
+inertia = [[0.4, 0.0, 0.0], [0.0, 0.4, 0.0], [0.0, 0.0, 0.4]]
+[[body]]
+name = "drum"
+mass = 1.0
+inertia = [[0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]]
+[[body]]
+name = "slide"
+mass = 8.0
+inertia = [[0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]]
+[[hinge]]
+name = "motor"
+kind = "revolute"
+axis = [0.0, 0.0, 1.0]
+parent = "world"
+child = "wheel"
+torque = { sine = { amplitude = 2.0, frequency_hz = 0.5 } }
+[[hinge]]
+name = "axle"
+kind = "revolute"
+axis = [0.0, 0.0, 1.0]
+parent = "world"
+child = "drum"
+[[hinge]]
+name = "rail"
+kind = "prismatic"
+axis = [1.0, 0.0, 0.0]
+parent = "world"
+child = "slide"
+[[closure]]
+name = "cable/1"
+kind = "gear"
+hinge_a = "motor"
+hinge_b = "axle"
+ratio = -2.0
+[[closure]]
+name = "rack"
+kind = "gear"
+hinge_a = "motor"
+hinge_b = "rail"
+ratio = 0.05
+"#;
+
+fn assembled(more: &str) -> Result<Scene, Box<dyn Error>> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/06_four_bar/scene.toml");
+    let text = std::fs::read_to_string(&path)? + GEARS + more;
+    Ok(assemble::assemble(Source { path, text }, &Overrides::default())?)
+}
+
+fn run(scene: &Scene, outputs: &mut OutputSet<'_>) -> Summary {
+    let settings = Settings { duration: 1.0, method: scene.method, rate_hz: scene.rate_hz };
+    simulate(&scene.system, &scene.state, &settings, &mut [outputs])
+}
+
+fn closed(outputs: OutputSet<'_>, summary: &Summary) -> RunReport {
+    outputs.finish(summary, "dormand_prince", Duration::from_secs(1), vec![])
+}
+
+/// What cable and rack carry at `time`: `J_b r a` and `m r a`, a = T / (J_a + r^2 J_b + r^2 m).
+fn gear_forces(time: f64) -> [f64; 2] {
+    let acceleration = 2.0 * (PI * time).sin() / (0.4 + 4.0 * 0.1 + 0.05 * 0.05 * 8.0);
+    [-2.0 * 0.1 * acceleration, 0.05 * 8.0 * acceleration]
+}
+
+fn text(attribute: &hdf5::Attribute) -> Result<String, hdf5::Error> {
+    Ok(attribute.read_scalar::<hdf5::types::FixedUnicode<4096>>()?.as_str().to_owned())
+}
+
+fn norm(x: &[f64]) -> f64 {
+    x.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+#[test]
+fn histories_start_with_the_evaluation_and_end_with_the_report() -> Tested {
+    let scene = assembled("")?;
+    let folder = tempfile::tempdir()?;
+    let file = folder.path().join("run.h5");
+    let mut outputs = OutputSet::new(&scene.system, scene_plan::plan(&scene, false)?)?;
+    outputs.write_results(&file)?;
+    let summary = run(&scene, &mut outputs);
+    let report = closed(outputs, &summary);
+    let (start, end) = (Evaluation::of(&scene.system, &scene.state)?, report.end.ok_or("no final record")?);
+
+    let h5 = hdf5::File::open(&file)?;
+    let pin = h5.group("closures/rocker_pin")?;
+    let (first, last) = (start.closures.get("rocker_pin").ok_or("no pin")?, end.closures.get("rocker_pin").ok_or("no pin")?);
+    for (name, unit, at_start, at_end) in
+        [("load_moment", "N m", first.load.moment, last.load.moment), ("load_force", "N", first.load.force, last.load.force)]
+    {
+        let dataset = pin.dataset(name)?;
+        let [u, frame, point, side] = ["unit", "frame", "point", "side"].map(|a| dataset.attr(a).and_then(|a| text(&a)));
+        assert_eq!((u?.as_str(), point?.as_str(), side?.as_str()), (unit, "origin of frame b", "by coupler on rocker"));
+        assert_eq!(frame?, "frame a of closure rocker_pin (on coupler)");
+        let rows = dataset.read_2d::<f64>()?;
+        assert_eq!(rows.shape(), [61, 3]);
+        assert_eq!(rows.row(0).to_vec(), at_start, "the same evaluation");
+        for (found, expected) in rows.row(60).iter().zip(at_end) {
+            // the end is the interpolant's last point, projected onto the closures
+            assert!((found - expected).abs() <= 1e-9 * (1.0 + norm(&at_end)), "{found} {expected}");
+        }
+    }
+    let residual = pin.dataset("residual")?;
+    assert_eq!(text(&residual.attr("unit")?)?, "m or rad");
+    let residual = residual.read_raw::<f64>()?;
+    assert!(residual.len() == 61 && residual[0] == first.residual && residual.iter().all(|r| (0.0..1e-10).contains(r)));
+    Ok(())
+}
+
+#[test]
+fn gears_have_the_force_on_their_coordinate_in_its_unit() -> Tested {
+    let scene = assembled("")?;
+    let folder = tempfile::tempdir()?;
+    let file = folder.path().join("run.h5");
+    let mut outputs = OutputSet::new(&scene.system, scene_plan::plan(&scene, false)?)?;
+    outputs.write_results(&file)?;
+    let summary = run(&scene, &mut outputs);
+    closed(outputs, &summary);
+
+    let h5 = hdf5::File::open(&file)?;
+    let times = h5.dataset("time")?.read_raw::<f64>()?;
+    let gears = [("cable%2F1", "N m", "rad", "axle"), ("rack", "N", "m", "rail")];
+    for (i, (name, unit, residual_unit, hinge)) in gears.into_iter().enumerate() {
+        let group = h5.group(&format!("closures/{name}"))?;
+        assert_eq!(group.len(), 2, "coordinate_force and residual");
+        let force = group.dataset("coordinate_force")?;
+        assert_eq!(text(&force.attr("unit")?)?, unit);
+        assert_eq!(text(&force.attr("side")?)?, format!("by coordinate 1 of motor on coordinate 1 of {hinge}"));
+        assert_eq!(text(&group.dataset("residual")?.attr("unit")?)?, residual_unit);
+        let force = force.read_raw::<f64>()?;
+        assert_eq!((force.len(), group.dataset("residual")?.size()), (61, 61));
+        for (found, time) in force.iter().zip(&times) {
+            assert!((found - gear_forces(*time)[i]).abs() < 1e-12, "{name} at {time}: {found}");
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn the_scene_chooses_which_closures_are_output() -> Tested {
+    let scene = assembled("[output]\nclosures = [\"rack\"]\n")?;
+    assert!(scene.left_out.contains(&"loads at 2 of 3 closures".to_owned()), "{:?}", scene.left_out);
+    let folder = tempfile::tempdir()?;
+    let file = folder.path().join("run.h5");
+    let mut outputs = OutputSet::new(&scene.system, scene_plan::plan(&scene, false)?)?;
+    outputs.write_results(&file)?;
+    let summary = run(&scene, &mut outputs);
+    let report = closed(outputs, &summary);
+    assert_eq!(hdf5::File::open(&file)?.group("closures")?.member_names()?, ["rack"]);
+    // the final record and the error figure are whole
+    assert_eq!(report.end.ok_or("no final record")?.closures.0.len(), 3);
+    assert!(report.errors.closure.is_some_and(|c| c < 1e-10));
+    Ok(())
+}
+
+#[test]
+fn scenes_without_closures_have_no_group_for_them() -> Tested {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/01_double_pendulum/scene.toml");
+    let scene = assemble::load(&path, &Overrides::default())?;
+    let folder = tempfile::tempdir()?;
+    let file = folder.path().join("run.h5");
+    let mut outputs = OutputSet::new(&scene.system, scene_plan::plan(&scene, false)?)?;
+    outputs.write_results(&file)?;
+    let summary = run(&scene, &mut outputs);
+    let report = closed(outputs, &summary);
+    assert!(!hdf5::File::open(&file)?.link_exists("closures"));
+    assert!(report.errors.closure.is_none());
+    Ok(())
+}
+
+#[test]
+fn faults_of_closure_outputs_are_named() -> Tested {
+    let refused = |more: &str| assembled(more).err().map(|e| e.to_string()).unwrap_or_default();
+    let cases: &[(&str, &[&str])] = &[
+        ("[output]\nclosures = [\"rack\", \"pin\"]\n", &["output.closures[2]", "\"pin\" is not a closure of the scene"]),
+        ("[output]\nclosures = [\"rack\", \"rack\"]\n", &["output.closures[2]", "\"rack\" is named twice"]),
+        ("[output]\nhinges = [\"motor\", \"motor\"]\n", &["output.hinges[2]", "\"motor\" is named twice"]),
+    ];
+    for (more, expected) in cases {
+        let message = refused(more);
+        for part in *expected {
+            assert!(message.contains(part), "{more}: no \"{part}\" in: {message}");
+        }
+    }
+    let scene = assembled("")?;
+    let refused = |plan: OutputPlan| OutputSet::new(&scene.system, plan).err().map(|e| e.to_string()).unwrap_or_default();
+    assert!(refused(OutputPlan { closures: vec![9], ..OutputPlan::default() }).contains("closure 9, but the system has 3 closures"));
+    Ok(())
+}
