@@ -1,8 +1,8 @@
-//! Loads of closures over time: the results file against the evaluation, the closing report and closed solutions.
+//! Loads of closures over time: results file, peaks and limits, against the evaluation, the closing report and closed solutions.
 #![cfg(feature = "hdf5")]
 
 use pliant::integrate::{Settings, Summary, simulate};
-use pliant::output::{Evaluation, OutputPlan, OutputSet, RunReport, scene_plan};
+use pliant::output::{Evaluation, Monitor, OutputPlan, OutputSet, RunReport, scene_plan};
 use pliant::scene::error::Source;
 use pliant::scene::{Overrides, Scene, assemble};
 use std::error::Error;
@@ -59,6 +59,10 @@ hinge_b = "rail"
 ratio = 0.05
 "#;
 
+/// Limits of the four-bar's pin (N) and of the cable (N m).
+const PIN_LIMIT: f64 = 20.0;
+const CABLE_LIMIT: f64 = 0.3;
+
 fn assembled(more: &str) -> Result<Scene, Box<dyn Error>> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/06_four_bar/scene.toml");
     let text = std::fs::read_to_string(&path)? + GEARS + more;
@@ -78,6 +82,12 @@ fn closed(outputs: OutputSet<'_>, summary: &Summary) -> RunReport {
 fn gear_forces(time: f64) -> [f64; 2] {
     let acceleration = 2.0 * (PI * time).sin() / (0.4 + 4.0 * 0.1 + 0.05 * 0.05 * 8.0);
     [-2.0 * 0.1 * acceleration, 0.05 * 8.0 * acceleration]
+}
+
+fn limits() -> String {
+    format!(
+        "[[monitor]]\nclosure = \"rocker_pin\"\nforce_limit = {PIN_LIMIT}\n[[monitor]]\nclosure = \"cable/1\"\nmoment_limit = {CABLE_LIMIT}\n"
+    )
 }
 
 fn text(attribute: &hdf5::Attribute) -> Result<String, hdf5::Error> {
@@ -121,6 +131,14 @@ fn histories_start_with_the_evaluation_and_end_with_the_report() -> Tested {
     assert_eq!(text(&residual.attr("unit")?)?, "m or rad");
     let residual = residual.read_raw::<f64>()?;
     assert!(residual.len() == 61 && residual[0] == first.residual && residual.iter().all(|r| (0.0..1e-10).contains(r)));
+
+    // the report looks at every step as well
+    let forces = pin.dataset("load_force")?.read_2d::<f64>()?;
+    let largest = forces.rows().into_iter().map(|r| norm(&r.to_vec())).fold(0.0, f64::max);
+    let peak = report.peaks.closures.get("rocker_pin").ok_or("no peak")?;
+    assert!(largest <= peak.force * (1.0 + 1e-12) && peak.force < 1.05 * largest, "{} {largest}", peak.force);
+    assert!(peak.moment == 0.0 && peak.time_s == peak.force_time_s && peak.time_s > 0.0);
+    assert_eq!(report.peaks.closures.iter().map(|(name, _)| name).collect::<Vec<_>>(), ["rocker_pin", "cable/1", "rack"]);
     Ok(())
 }
 
@@ -132,7 +150,7 @@ fn gears_have_the_force_on_their_coordinate_in_its_unit() -> Tested {
     let mut outputs = OutputSet::new(&scene.system, scene_plan::plan(&scene, false)?)?;
     outputs.write_results(&file)?;
     let summary = run(&scene, &mut outputs);
-    closed(outputs, &summary);
+    let report = closed(outputs, &summary);
 
     let h5 = hdf5::File::open(&file)?;
     let times = h5.dataset("time")?.read_raw::<f64>()?;
@@ -150,12 +168,38 @@ fn gears_have_the_force_on_their_coordinate_in_its_unit() -> Tested {
             assert!((found - gear_forces(*time)[i]).abs() < 1e-12, "{name} at {time}: {found}");
         }
     }
+    let [cable, rack] = ["cable/1", "rack"].map(|name| report.peaks.closures.get(name).copied().unwrap_or_default());
+    // the half wave has its top at 0.5 s, which is an output time
+    assert!((cable.moment - gear_forces(0.5)[0].abs()).abs() < 1e-12 && cable.force == 0.0, "{cable:?}");
+    assert!((rack.force - gear_forces(0.5)[1].abs()).abs() < 1e-12 && rack.moment == 0.0, "{rack:?}");
+    assert!((cable.time_s - 0.5).abs() < 1e-3 && (rack.time_s - 0.5).abs() < 1e-3, "{cable:?} {rack:?}");
+    Ok(())
+}
+
+#[test]
+fn limits_of_closures_are_watched() -> Tested {
+    let scene = assembled(&limits())?;
+    let mut outputs = OutputSet::new(&scene.system, scene_plan::plan(&scene, false)?)?;
+    let summary = run(&scene, &mut outputs);
+    let report = closed(outputs, &summary);
+    let of = |name: &str| report.exceedances.iter().filter(|e| e.name == name).collect::<Vec<_>>();
+    let cable = of("cable/1");
+    assert_eq!(cable.len(), 1);
+    assert_eq!((cable[0].kind, cable[0].quantity, cable[0].unit, cable[0].limit), ("closure", "moment", "N m", CABLE_LIMIT));
+    // up to the next output time after the crossing
+    let crossing = (CABLE_LIMIT / gear_forces(0.5)[0].abs()).asin() / PI;
+    let late = [cable[0].start_s - crossing, cable[0].end_s.ok_or("no end")? - (1.0 - crossing)];
+    assert!(late.iter().all(|t| (0.0..1.0 / 60.0 + 1e-9).contains(t)), "{late:?}");
+    let pin = of("rocker_pin");
+    assert!(!pin.is_empty() && pin.iter().all(|e| e.quantity == "force" && e.unit == "N" && e.peak > PIN_LIMIT), "{pin:?}");
+    let peak = report.peaks.closures.get("rocker_pin").ok_or("no peak")?;
+    assert_eq!(pin.iter().map(|e| e.peak).fold(0.0, f64::max), peak.force);
     Ok(())
 }
 
 #[test]
 fn the_scene_chooses_which_closures_are_output() -> Tested {
-    let scene = assembled("[output]\nclosures = [\"rack\"]\n")?;
+    let scene = assembled("[output]\nclosures = [\"rack\"]\n[[monitor]]\nclosure = \"cable/1\"\nmoment_limit = 0.3\n")?;
     assert!(scene.left_out.contains(&"loads at 2 of 3 closures".to_owned()), "{:?}", scene.left_out);
     let folder = tempfile::tempdir()?;
     let file = folder.path().join("run.h5");
@@ -164,6 +208,8 @@ fn the_scene_chooses_which_closures_are_output() -> Tested {
     let summary = run(&scene, &mut outputs);
     let report = closed(outputs, &summary);
     assert_eq!(hdf5::File::open(&file)?.group("closures")?.member_names()?, ["rack"]);
+    let peaks: Vec<_> = report.peaks.closures.iter().map(|(name, _)| name).collect();
+    assert_eq!(peaks, ["cable/1", "rack"], "a limit is watched whether or not the load is written");
     // the final record and the error figure are whole
     assert_eq!(report.end.ok_or("no final record")?.closures.0.len(), 3);
     assert!(report.errors.closure.is_some_and(|c| c < 1e-10));
@@ -181,7 +227,7 @@ fn scenes_without_closures_have_no_group_for_them() -> Tested {
     let summary = run(&scene, &mut outputs);
     let report = closed(outputs, &summary);
     assert!(!hdf5::File::open(&file)?.link_exists("closures"));
-    assert!(report.errors.closure.is_none());
+    assert!(report.peaks.closures.0.is_empty() && report.errors.closure.is_none());
     Ok(())
 }
 
@@ -189,6 +235,21 @@ fn scenes_without_closures_have_no_group_for_them() -> Tested {
 fn faults_of_closure_outputs_are_named() -> Tested {
     let refused = |more: &str| assembled(more).err().map(|e| e.to_string()).unwrap_or_default();
     let cases: &[(&str, &[&str])] = &[
+        ("[[monitor]]\nclosure = \"pin\"\n", &["monitor[1].closure", "\"pin\" is not a closure of the scene"]),
+        ("[[monitor]]\nclosure = \"rocker_pin\"\nforce_limit = -2.0\n", &["monitor[1].force_limit", "-2 must be positive"]),
+        (
+            "[[monitor]]\nclosure = \"rocker_pin\"\nstress_limit = 2.0\n",
+            &["monitor[1]", "hinge = NAME or closure = NAME with moment_limit, force_limit"],
+        ),
+        ("[[monitor]]\nclosure = \"rocker_pin\"\nhinge = \"motor\"\n", &["monitor[1]", "watches one of"]),
+        (
+            "[[monitor]]\nclosure = \"cable/1\"\nforce_limit = 2.0\n",
+            &["monitor[1].force_limit", "\"cable/1\" is a gear", "coordinate b is in N m; give moment_limit instead"],
+        ),
+        (
+            "[[monitor]]\nclosure = \"rack\"\nmoment_limit = 2.0\n",
+            &["monitor[1].moment_limit", "\"rack\" is a gear", "coordinate b is in N; give force_limit instead"],
+        ),
         ("[output]\nclosures = [\"rack\", \"pin\"]\n", &["output.closures[2]", "\"pin\" is not a closure of the scene"]),
         ("[output]\nclosures = [\"rack\", \"rack\"]\n", &["output.closures[2]", "\"rack\" is named twice"]),
         ("[output]\nhinges = [\"motor\", \"motor\"]\n", &["output.hinges[2]", "\"motor\" is named twice"]),
@@ -202,5 +263,7 @@ fn faults_of_closure_outputs_are_named() -> Tested {
     let scene = assembled("")?;
     let refused = |plan: OutputPlan| OutputSet::new(&scene.system, plan).err().map(|e| e.to_string()).unwrap_or_default();
     assert!(refused(OutputPlan { closures: vec![9], ..OutputPlan::default() }).contains("closure 9, but the system has 3 closures"));
+    let monitors = vec![Monitor::Closure { closure: 0, moment_limit: None, force_limit: Some(-1.0) }];
+    assert!(refused(OutputPlan { monitors, ..OutputPlan::default() }).contains("the force limit of closure \"rocker_pin\" is -1"));
     Ok(())
 }

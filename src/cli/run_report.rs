@@ -3,6 +3,8 @@
 use super::failure::Failure;
 use super::report::{Align, Table, number};
 use crate::output::RunReport;
+use crate::output::evaluation::Named;
+use crate::output::report::LoadPeak;
 use std::io::Write;
 
 /// Writes the report.
@@ -19,18 +21,12 @@ pub fn write(scene: &str, report: &RunReport, output: &mut dyn Write) -> Result<
         report.evaluations
     )?;
     let right = Align::Right;
-    let mut hinges = Table::new(&[
-        ("hinge", Align::Left),
-        ("peak moment (N m)", right),
-        ("at (s)", right),
-        ("peak force (N)", right),
-        ("at (s)", right),
-    ]);
-    for (name, peak) in report.peaks.hinges.iter() {
-        hinges.row([name.to_owned(), number(peak.moment), number(peak.moment_time_s), number(peak.force), number(peak.force_time_s)]);
-    }
     writeln!(output, "\npeak hinge loads over all steps, by the parent on the child, moment about O:")?;
-    hinges.write(output)?;
+    load_peaks("hinge", &report.peaks.hinges).write(output)?;
+    if !report.peaks.closures.0.is_empty() {
+        writeln!(output, "\npeak closure loads over all steps, on b, moment about b's point; of a gear what acts on coordinate b:")?;
+        load_peaks("closure", &report.peaks.closures).write(output)?;
+    }
     if !report.peaks.bodies.0.is_empty() {
         let mut bodies = Table::new(&[
             ("body", Align::Left),
@@ -84,4 +80,15 @@ pub fn write(scene: &str, report: &RunReport, output: &mut dyn Write) -> Result<
         writeln!(output, "wrote {} {}: {} output times", file.kind, file.target, file.frames)?;
     }
     Ok(())
+}
+
+/// Peaks of moments and forces; `of` is what carries them.
+fn load_peaks(of: &str, peaks: &Named<LoadPeak>) -> Table {
+    let right = Align::Right;
+    let mut table =
+        Table::new(&[(of, Align::Left), ("peak moment (N m)", right), ("at (s)", right), ("peak force (N)", right), ("at (s)", right)]);
+    for (name, peak) in peaks.iter() {
+        table.row([name.to_owned(), number(peak.moment), number(peak.moment_time_s), number(peak.force), number(peak.force_time_s)]);
+    }
+    table
 }

@@ -172,6 +172,11 @@ impl OutputPlan {
                     positive(format!("the moment limit of hinge \"{hinge}\""), moment_limit)?;
                     positive(format!("the force limit of hinge \"{hinge}\""), force_limit)?;
                 }
+                Monitor::Closure { closure, moment_limit, force_limit } => {
+                    let name = closure_name(closure)?;
+                    positive(format!("the moment limit of closure \"{name}\""), moment_limit)?;
+                    positive(format!("the force limit of closure \"{name}\""), force_limit)?;
+                }
                 Monitor::Body { body, stress_limit } => {
                     let name = name(body)?;
                     positive(format!("the stress limit of body \"{name}\""), stress_limit)?;
@@ -189,15 +194,19 @@ impl OutputPlan {
     pub fn loaded_hinges(&self) -> Vec<usize> {
         let monitored = self.monitors.iter().filter_map(|m| match *m {
             Monitor::Hinge { body, .. } => Some(body),
-            Monitor::Body { .. } => None,
+            Monitor::Closure { .. } | Monitor::Body { .. } => None,
         });
         each_once(self.hinges.iter().copied().chain(monitored))
     }
 
-    /// Closures whose load is evaluated.
+    /// Closures whose load is evaluated: outputs first, then those that only a monitor asks for.
     #[must_use]
     pub fn loaded_closures(&self) -> Vec<usize> {
-        self.closures.clone()
+        let monitored = self.monitors.iter().filter_map(|m| match *m {
+            Monitor::Closure { closure, .. } => Some(closure),
+            Monitor::Hinge { .. } | Monitor::Body { .. } => None,
+        });
+        each_once(self.closures.iter().copied().chain(monitored))
     }
 
     /// Limits of moment (N m) and force (N) at the hinge of `body`, the tightest of each.
@@ -205,6 +214,15 @@ impl OutputPlan {
     pub fn hinge_limits(&self, body: usize) -> (Option<f64>, Option<f64>) {
         self.tightest(|monitor| match *monitor {
             Monitor::Hinge { body: b, moment_limit, force_limit } if b == body => Some((moment_limit, force_limit)),
+            _ => None,
+        })
+    }
+
+    /// Limits of moment (N m) and force (N) of a closure, the tightest of each.
+    #[must_use]
+    pub fn closure_limits(&self, closure: usize) -> (Option<f64>, Option<f64>) {
+        self.tightest(|monitor| match *monitor {
+            Monitor::Closure { closure: c, moment_limit, force_limit } if c == closure => Some((moment_limit, force_limit)),
             _ => None,
         })
     }

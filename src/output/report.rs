@@ -19,14 +19,14 @@ pub struct ErrorFigures {
     pub local: Option<f64>,
 }
 
-/// Largest load magnitudes at one hinge over all steps and output times.
+/// Largest load magnitudes at one hinge or closure over all steps and output times. What a gear exerts on an angle counts as a moment.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
-pub struct HingePeak {
+pub struct LoadPeak {
     /// N m.
     pub moment: f64,
     /// N.
     pub force: f64,
-    /// Time of the moment's peak, or of the force's at a hinge that never carries a moment (s).
+    /// Time of the moment's peak, or of the force's where there never is a moment (s).
     pub time_s: f64,
     /// s.
     pub moment_time_s: f64,
@@ -47,11 +47,13 @@ pub struct BodyPeak {
     pub position: [f64; 3],
 }
 
-/// Peaks over the output times.
+/// Peaks: of loads over all steps and output times, of stress over the output times.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Peaks {
     /// By hinge.
-    pub hinges: Named<HingePeak>,
+    pub hinges: Named<LoadPeak>,
+    /// By closure.
+    pub closures: Named<LoadPeak>,
     /// By body.
     pub bodies: Named<BodyPeak>,
 }
@@ -59,9 +61,9 @@ pub struct Peaks {
 /// A stay above a limit.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Exceedance {
-    /// "hinge" or "body".
+    /// "hinge", "closure" or "body".
     pub kind: &'static str,
-    /// Name of the hinge or body.
+    /// Name of the hinge, closure or body.
     pub name: String,
     /// "moment", "force" or "von_mises".
     pub quantity: &'static str,
@@ -71,7 +73,7 @@ pub struct Exceedance {
     pub limit: f64,
     /// Largest value of this stay.
     pub peak: f64,
-    /// First time above the limit: an output time, for hinge loads also the end of a step (s).
+    /// First time above the limit: an output time, for loads also the end of a step (s).
     pub start_s: f64,
     /// First such time back at or below it; none if the run ended above (s).
     pub end_s: Option<f64>,

@@ -1,9 +1,10 @@
-//! Peaks, limits and error figures, followed over the output times; hinge loads over the ends of the steps as well.
+//! Peaks, limits and error figures, followed over the output times; loads of hinges and closures over the ends of the steps as well.
 
+use super::closure_load::{ClosureGauge, ClosureRecord};
 use super::evaluation::Named;
 use super::frame::OutputFrame;
 use super::plan::OutputPlan;
-use super::report::{BodyPeak, ErrorFigures, Exceedance, HingePeak, Peaks};
+use super::report::{BodyPeak, ErrorFigures, Exceedance, LoadPeak, Peaks};
 use super::scales::plain;
 use crate::dynamics::energy::Momentum;
 use crate::dynamics::hinge_load::hinge_load;
@@ -48,37 +49,47 @@ struct Watch {
     open: Option<usize>,
 }
 
-/// Index into the frame's loads or stresses.
+/// Index into the frame's loads, closures or stresses.
 #[derive(Debug, Clone, Copy)]
 enum Source {
-    Moment(usize),
-    Force(usize),
+    Hinge(usize, Part),
+    Closure(usize, Part),
     Stress(usize),
 }
 
+/// Part of a load, by its place among the magnitudes.
+#[derive(Debug, Clone, Copy)]
+enum Part {
+    Moment = 0,
+    Force = 1,
+}
+
 impl Source {
-    /// The value where only hinge loads are known.
-    fn of_load(self, loads: &[Vector6<f64>]) -> Option<f64> {
+    /// The value where only loads are known.
+    fn of_load(self, hinges: &[Vector6<f64>], closures: &[ClosureRecord]) -> Option<f64> {
         match self {
-            Self::Moment(i) => Some(angular(&loads[i]).norm()),
-            Self::Force(i) => Some(linear(&loads[i]).norm()),
+            Self::Hinge(i, part) => Some(magnitudes(&hinges[i])[part as usize]),
+            Self::Closure(i, part) => Some(closures[i].load.magnitudes()[part as usize]),
             Self::Stress(_) => None,
         }
     }
 
-    fn value(self, frame: &OutputFrame) -> f64 {
+    fn value(self, frame: &OutputFrame) -> Option<f64> {
         match self {
-            Self::Moment(i) => angular(&frame.loads[i]).norm(),
-            Self::Force(i) => linear(&frame.loads[i]).norm(),
-            Self::Stress(i) => frame.stress[i].value,
+            Self::Stress(i) => Some(frame.stress[i].value),
+            load => load.of_load(&frame.loads, &frame.closures),
         }
     }
 }
 
-/// Raises the peaks of hinges to the magnitudes of `loads` at `time`.
-fn raise_peaks(hinges: &mut [(String, HingePeak)], loads: &[Vector6<f64>], time: f64) {
-    for ((_, peak), load) in hinges.iter_mut().zip(loads) {
-        let (moment, force) = (angular(load).norm(), linear(load).norm());
+/// Magnitudes of the moment and force of a hinge load.
+fn magnitudes(load: &Vector6<f64>) -> [f64; 2] {
+    [angular(load).norm(), linear(load).norm()]
+}
+
+/// Raises peaks to the magnitudes of moment and force at `time`.
+fn raise_peaks(peaks: &mut [(String, LoadPeak)], loads: impl Iterator<Item = [f64; 2]>, time: f64) {
+    for ((_, peak), [moment, force]) in peaks.iter_mut().zip(loads) {
         if moment > peak.moment {
             (peak.moment, peak.moment_time_s) = (moment, time);
         }
@@ -89,13 +100,17 @@ fn raise_peaks(hinges: &mut [(String, HingePeak)], loads: &[Vector6<f64>], time:
     }
 }
 
-/// Follows a run over its output times, hinge loads over its steps as well.
+/// Follows a run over its output times, loads over its steps as well.
 #[derive(Debug, Clone)]
 pub struct Tracker {
-    hinges: Vec<(String, HingePeak)>,
+    hinges: Vec<(String, LoadPeak)>,
     /// Bodies that the hinges carry, in the same order, and their loads at the last step.
     loaded: Vec<usize>,
     loads: Vec<Vector6<f64>>,
+    closures: Vec<(String, LoadPeak)>,
+    /// The closures, in the same order, and what they carried at the last step.
+    gauges: Vec<ClosureGauge>,
+    records: Vec<ClosureRecord>,
     bodies: Vec<(usize, String, BodyPeak)>,
     watches: Vec<Watch>,
     exceedances: Vec<Exceedance>,
@@ -127,7 +142,9 @@ impl Tracker {
     #[must_use]
     pub fn new(system: &System, plan: &OutputPlan) -> Self {
         let loaded = plan.loaded_hinges();
-        let hinges = loaded.iter().map(|&k| (system.bodies[k].hinge.name.clone(), HingePeak::default())).collect();
+        let hinges = loaded.iter().map(|&k| (system.bodies[k].hinge.name.clone(), LoadPeak::default())).collect();
+        let gauges: Vec<_> = plan.loaded_closures().into_iter().map(|i| ClosureGauge::new(system, i)).collect();
+        let closures = gauges.iter().map(|g| (system.closures[g.closure()].name.clone(), LoadPeak::default())).collect();
         let stressed = plan.surfaces.iter().enumerate().filter(|(_, s)| s.stress);
         let bodies = stressed.map(|(i, s)| (i, system.bodies[s.body].name.clone(), BodyPeak::default())).collect();
         let mut watches = Vec::new();
@@ -138,8 +155,13 @@ impl Tracker {
         };
         for (i, &body) in loaded.iter().enumerate() {
             let (name, (moment, force)) = (&system.bodies[body].hinge.name, plan.hinge_limits(body));
-            watch(Source::Moment(i), "hinge", name, "moment", "N m", moment);
-            watch(Source::Force(i), "hinge", name, "force", "N", force);
+            watch(Source::Hinge(i, Part::Moment), "hinge", name, "moment", "N m", moment);
+            watch(Source::Hinge(i, Part::Force), "hinge", name, "force", "N", force);
+        }
+        for (i, gauge) in gauges.iter().enumerate() {
+            let (name, (moment, force)) = (&system.closures[gauge.closure()].name, plan.closure_limits(gauge.closure()));
+            watch(Source::Closure(i, Part::Moment), "closure", name, "moment", "N m", moment);
+            watch(Source::Closure(i, Part::Force), "closure", name, "force", "N", force);
         }
         for (i, surface) in plan.surfaces.iter().enumerate().filter(|(_, s)| s.stress) {
             watch(Source::Stress(i), "body", &system.bodies[surface.body].name, "von_mises", "Pa", plan.stress_limit(surface.body));
@@ -148,6 +170,9 @@ impl Tracker {
             hinges,
             loads: vec![Vector6::zeros(); loaded.len()],
             loaded,
+            closures,
+            records: gauges.iter().map(ClosureGauge::nothing).collect(),
+            gauges,
             bodies,
             watches,
             exceedances: Vec::new(),
@@ -170,7 +195,8 @@ impl Tracker {
     /// Takes in one output time.
     pub fn follow(&mut self, plan: &OutputPlan, sample: &Sample<'_>, frame: &OutputFrame) {
         let time = sample.state.time;
-        raise_peaks(&mut self.hinges, &frame.loads, time);
+        raise_peaks(&mut self.hinges, frame.loads.iter().map(magnitudes), time);
+        raise_peaks(&mut self.closures, frame.closures.iter().map(|r| r.load.magnitudes()), time);
         for (index, _, peak) in &mut self.bodies {
             let found = frame.stress[*index];
             if found.value > peak.von_mises {
@@ -178,7 +204,7 @@ impl Tracker {
                 *peak = BodyPeak { von_mises: found.value, time_s: time, node: found.node, position };
             }
         }
-        self.watch_limits(time, |source| Some(source.value(frame)));
+        self.watch_limits(time, |source| source.value(frame));
         self.events.clear();
         self.events.append(&mut self.since);
         self.follow_balances(sample, frame);
@@ -196,10 +222,14 @@ impl Tracker {
         for (load, &k) in self.loads.iter_mut().zip(&self.loaded) {
             *load = hinge_load(step.workspace, k);
         }
-        raise_peaks(&mut self.hinges, &self.loads, time);
-        let loads = std::mem::take(&mut self.loads);
-        self.watch_limits(time, |source| source.of_load(&loads));
-        self.loads = loads;
+        for (record, gauge) in self.records.iter_mut().zip(&self.gauges) {
+            *record = gauge.read(step.system, step.workspace);
+        }
+        raise_peaks(&mut self.hinges, self.loads.iter().map(magnitudes), time);
+        raise_peaks(&mut self.closures, self.records.iter().map(|r| r.load.magnitudes()), time);
+        let (loads, records) = (std::mem::take(&mut self.loads), std::mem::take(&mut self.records));
+        self.watch_limits(time, |source| source.of_load(&loads, &records));
+        (self.loads, self.records) = (loads, records);
     }
 
     /// Holds the quantities that `value` knows against their limits.
@@ -239,13 +269,15 @@ impl Tracker {
         self.span = self.span.max(reach);
     }
 
-    /// Peaks so far, in the order in which the scene defines hinges and bodies.
+    /// Peaks so far, in the order in which the scene defines hinges, closures and bodies.
     #[must_use]
     pub fn peaks(&self, system: &System) -> Peaks {
         let in_order = || system.definition_order.iter().map(|&k| &system.bodies[k]);
         let hinges = in_order().filter_map(|b| self.hinges.iter().find(|(name, _)| *name == b.hinge.name)).cloned();
+        let closures = system.closures.iter().filter_map(|c| self.closures.iter().find(|(name, _)| *name == c.name)).cloned();
         let bodies = in_order().filter_map(|b| self.bodies.iter().find(|(_, name, _)| *name == b.name));
-        Peaks { hinges: hinges.collect(), bodies: bodies.map(|(_, name, peak)| (name.clone(), *peak)).collect::<Named<_>>() }
+        let bodies = bodies.map(|(_, name, peak)| (name.clone(), *peak)).collect::<Named<_>>();
+        Peaks { hinges: hinges.collect(), closures: closures.collect(), bodies }
     }
 
     /// Stays above limits so far.

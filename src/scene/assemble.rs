@@ -1,6 +1,6 @@
 //! A scene file to a [`Scene`]: the system, its initial state, and what a run of it shall do.
 
-use super::closures::closure_index;
+use super::closures::{closure_index, gear_unit};
 use super::error::{SceneError, Source};
 use super::functions::function;
 use super::locate::{Step, first_not_finite};
@@ -28,13 +28,22 @@ pub struct Overrides {
     pub closure_method: Option<String>,
 }
 
-/// Limits to watch at every output time.
+/// Limits to watch: of loads at every step and output time, of stress at every output time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Monitor {
     /// Magnitudes of the load at the inboard hinge of a body.
     Hinge {
         /// Index of the body that the hinge carries.
         body: usize,
+        /// N m.
+        moment_limit: Option<f64>,
+        /// N.
+        force_limit: Option<f64>,
+    },
+    /// Magnitudes of the load of a closure; what a gear exerts on an angle counts as a moment, on a travel as a force.
+    Closure {
+        /// Index of the closure.
+        closure: usize,
         /// N m.
         moment_limit: Option<f64>,
         /// N.
@@ -234,20 +243,34 @@ fn monitor(index: usize, spec: &MonitorSpec, system: &System, source: &Source) -
         }
     }
     let MonitorSpec { moment_limit, force_limit, stress_limit, .. } = *spec;
-    match (&spec.hinge, &spec.body) {
-        (Some(name), None) if stress_limit.is_none() => {
+    match (&spec.hinge, &spec.closure, &spec.body) {
+        (Some(name), None, None) if stress_limit.is_none() => {
             let body =
                 system.hinge_index(name).ok_or_else(|| source.value(&at("hinge"), format!("\"{name}\" is not a hinge of the scene")))?;
             Ok(Monitor::Hinge { body, moment_limit, force_limit })
         }
-        (None, Some(name)) if moment_limit.is_none() && force_limit.is_none() => {
+        (None, Some(name), None) if stress_limit.is_none() => {
+            let closure = closure_index(system, name);
+            let closure = closure.ok_or_else(|| source.value(&at("closure"), format!("\"{name}\" is not a closure of the scene")))?;
+            let refused = |key, unit, instead| {
+                let message =
+                    format!("closure \"{name}\" is a gear, and what it exerts on coordinate b is in {unit}; give {instead} instead");
+                Err(source.value(&at(key), message))
+            };
+            match gear_unit(system, &system.closures[closure]) {
+                Some(unit @ "N m") if force_limit.is_some() => refused("force_limit", unit, "moment_limit"),
+                Some(unit @ "N") if moment_limit.is_some() => refused("moment_limit", unit, "force_limit"),
+                _ => Ok(Monitor::Closure { closure, moment_limit, force_limit }),
+            }
+        }
+        (None, None, Some(name)) if moment_limit.is_none() && force_limit.is_none() => {
             let body = system.body_index(name).filter(|&k| system.bodies[k].flexible().is_some());
             let body = body.ok_or_else(|| source.value(&at("body"), format!("\"{name}\" is not a flexible body of the scene")))?;
             Ok(Monitor::Body { body, stress_limit })
         }
         _ => Err(source.value(
             &[Step::Key("monitor"), Step::Index(index)],
-            "a monitor watches either hinge = NAME with moment_limit, force_limit, or body = NAME with stress_limit",
+            "a monitor watches one of hinge = NAME or closure = NAME with moment_limit, force_limit, or body = NAME with stress_limit",
         )),
     }
 }

@@ -270,6 +270,8 @@ fn world() -> String {
 pub struct MonitorSpec {
     /// Hinge to watch.
     pub hinge: Option<String>,
+    /// Closure to watch.
+    pub closure: Option<String>,
     /// Body to watch.
     pub body: Option<String>,
     /// Largest moment magnitude (N m).
