@@ -1,10 +1,14 @@
-//! Loads of closures over time: results file, peaks and limits, against the evaluation, the closing report and closed solutions.
+//! Loads of closures over time: results file, peaks, limits and stream, against the evaluation, the closing report and closed solutions.
 #![cfg(feature = "hdf5")]
 
-use pliant::integrate::{Settings, Summary, simulate};
+use nalgebra::Vector3;
+use pliant::integrate::{Flow, Observer, Sample, Settings, Summary, simulate};
+use pliant::output::frame::FrameEvaluator;
+use pliant::output::picture::Snapshot;
 use pliant::output::{Evaluation, Monitor, OutputPlan, OutputSet, RunReport, scene_plan};
 use pliant::scene::error::Source;
 use pliant::scene::{Overrides, Scene, assemble};
+use pliant::spatial::rotation::matrix_of_quaternion;
 use std::error::Error;
 use std::f64::consts::PI;
 use std::path::Path;
@@ -266,4 +270,167 @@ fn faults_of_closure_outputs_are_named() -> Tested {
     let monitors = vec![Monitor::Closure { closure: 0, moment_limit: None, force_limit: Some(-1.0) }];
     assert!(refused(OutputPlan { monitors, ..OutputPlan::default() }).contains("the force limit of closure \"rocker_pin\" is -1"));
     Ok(())
+}
+
+/// Snapshots of the four-bar's pin.
+struct Snapshots {
+    evaluator: FrameEvaluator,
+    plan: OutputPlan,
+    taken: Vec<(Vec<f64>, Snapshot)>,
+}
+
+impl Observer for Snapshots {
+    fn observe(&mut self, sample: &Sample<'_>) -> Flow {
+        self.evaluator.evaluate(&self.plan, sample);
+        let snapshot = Snapshot::of(&[], &self.plan.loaded_closures(), sample, &self.evaluator.frame, &[]);
+        self.taken.push((sample.state.position.clone(), snapshot));
+        Flow::Continue
+    }
+}
+
+#[test]
+fn arrows_of_a_closure_stand_at_the_point_of_b_in_inertial_axes() -> Tested {
+    let scene = assembled("")?;
+    let plan = scene_plan::plan(&scene, false)?;
+    let mut snapshots = Snapshots { evaluator: FrameEvaluator::new(&scene.system, &plan), plan, taken: Vec::new() };
+    let settings = Settings { duration: 0.5, method: scene.method, rate_hz: 20.0 };
+    simulate(&scene.system, &scene.state, &settings, &mut [&mut snapshots]);
+    let coordinate = |name: &str| scene.system.hinge_index(name).map(|k| scene.system.bodies[k].position).ok_or("no such hinge");
+    let (foot, pin, rocker) = (coordinate("crank_foot")?, coordinate("crank_pin")?, coordinate("rocker_foot")?);
+    assert_eq!(snapshots.taken.len(), 11);
+    for (position, snapshot) in &snapshots.taken {
+        let joint = snapshot.closures[0].joint.ok_or("no load")?;
+        // the rocker, 1.5 m long, turns about x = 2 m; frame a turns with the coupler
+        let (sin, cos) = position[rocker].sin_cos();
+        for (found, expected) in joint.point.iter().zip([2.0 + 1.5 * cos, 1.5 * sin, 0.0]) {
+            assert!((found - expected).abs() < 1e-12, "{:?}", joint.point);
+        }
+        let (sin, cos) = (position[foot] + position[pin]).sin_cos();
+        let force = [3, 4, 5].map(|i| joint.load[i]);
+        let turned = [cos * force[0] - sin * force[1], sin * force[0] + cos * force[1], force[2]];
+        for (found, expected) in joint.force_world.iter().zip(turned) {
+            assert!((found - expected).abs() < 1e-12 * (1.0 + norm(&force)), "{:?} {turned:?}", joint.force_world);
+        }
+        assert!(snapshot.closures[1].joint.is_none() && snapshot.closures[1].gear.is_some());
+    }
+    Ok(())
+}
+
+#[test]
+fn arrows_of_a_closure_on_a_flexible_body_move_with_it() -> Tested {
+    // the scene of the README, its panel held near 0.3 rad by a rod between hub and outboard end
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let readme = std::fs::read_to_string(root.join("README.md"))?;
+    let base = readme.split("```toml\n").nth(1).and_then(|block| block.split("```").next()).ok_or("no scene")?;
+    let (y, z) = (2.0 * 0.3_f64.cos() - 0.5, 1.2 - 2.0 * 0.3_f64.sin());
+    let rod = format!(
+        "[[body]]\nname = \"rod\"\nmass = 1.0\ninertia = [[0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]]\n\
+         [[hinge]]\nname = \"socket\"\nkind = \"spherical\"\nparent = \"hub\"\nparent_frame = {{ position = [0.0, 1.0, -1.2] }}\nchild = \"rod\"\n\
+         [[closure]]\nname = \"ball\"\nkind = \"spherical\"\nbody_a = \"rod\"\nframe_a = {{ position = [0.0, {y}, {z}] }}\n\
+         body_b = \"panel\"\nnode_b = \"outboard\"\n"
+    );
+    let source = Source { path: root.join("README.toml"), text: format!("{base}\n{rod}") };
+    let scene = assemble::assemble(source, &Overrides::default())?;
+    let plan = scene_plan::plan(&scene, false)?;
+    let mut snapshots = Snapshots { evaluator: FrameEvaluator::new(&scene.system, &plan), plan, taken: Vec::new() };
+    let settings = Settings { duration: 2.0, method: scene.method, rate_hz: 10.0 };
+    simulate(&scene.system, &scene.state, &settings, &mut [&mut snapshots]);
+    let rod = scene.system.body_index("rod").ok_or("no rod")?;
+    let (mut moved, mut carried) = (0.0_f64, 0.0_f64);
+    for (_, snapshot) in &snapshots.taken {
+        let joint = snapshot.closures[0].joint.ok_or("no load")?;
+        let (position, quaternion) = snapshot.poses[rod];
+        let end = matrix_of_quaternion(&quaternion) * Vector3::new(0.0, y, z) + Vector3::from(position);
+        // b's point, found by way of the panel's modes, is a's as far as the closure is closed
+        let apart = (Vector3::from(joint.point) - end).norm();
+        assert!(apart < 1e-9, "{apart:e} at {}", snapshot.time);
+        moved = snapshot.modal_position.iter().fold(moved, |m, x| m.max(x.abs()));
+        carried = carried.max(norm(&joint.force_world));
+    }
+    assert!(snapshots.taken.len() == 21 && moved > 1e-6 && carried > 1e-3, "{moved} {carried}");
+    Ok(())
+}
+
+#[cfg(feature = "rerun")]
+mod stream {
+    use super::*;
+    use rerun::external::re_log_types::LogMsg;
+    use std::collections::BTreeMap;
+
+    /// Scalars by entity in the order of time, names of series, arrows per entity.
+    #[derive(Default)]
+    struct Logged {
+        scalars: BTreeMap<String, Vec<Vec<f64>>>,
+        names: BTreeMap<String, Vec<String>>,
+        arrows: BTreeMap<String, usize>,
+        legend: String,
+    }
+
+    fn read(messages: Vec<LogMsg>) -> Result<Logged, Box<dyn Error>> {
+        let mut logged = Logged::default();
+        for message in messages {
+            let LogMsg::ArrowMsg(store, arrow) = message else { continue };
+            if store.kind() != rerun::StoreKind::Recording {
+                continue;
+            }
+            let chunk = rerun::log::Chunk::from_arrow_msg(&arrow)?;
+            let entity = chunk.entity_path().to_string();
+            let scalars = chunk.iter_component::<rerun::components::Scalar>(rerun::Scalars::descriptor_scalars().component);
+            let rows = scalars.map(|row| row.as_slice().iter().map(|s| s.0.0).collect::<Vec<f64>>());
+            logged.scalars.entry(entity.clone()).or_default().extend(rows);
+            let names = chunk.iter_component::<rerun::components::Name>(rerun::SeriesLines::descriptor_names().component);
+            let names = names.flat_map(|row| row.as_slice().iter().map(|t| t.to_string()).collect::<Vec<_>>());
+            logged.names.entry(entity.clone()).or_default().extend(names);
+            let arrows = chunk.iter_component::<rerun::components::Vector3D>(rerun::Arrows3D::descriptor_vectors().component).count();
+            *logged.arrows.entry(entity).or_default() += arrows;
+            let texts = chunk.iter_component::<rerun::components::Text>(rerun::TextDocument::descriptor_text().component);
+            logged.legend.extend(texts.flat_map(|row| row.as_slice().iter().map(|t| t.to_string()).collect::<Vec<_>>()));
+        }
+        Ok(logged)
+    }
+
+    #[test]
+    fn the_stream_has_the_numbers_of_the_file_and_arrows() -> Tested {
+        let scene = assembled(&limits())?;
+        let folder = tempfile::tempdir()?;
+        let file = folder.path().join("run.h5");
+        let (recording, store) = rerun::RecordingStreamBuilder::new("test").memory()?;
+        let mut outputs = OutputSet::new(&scene.system, scene_plan::plan(&scene, true)?)?;
+        outputs.write_results(&file)?;
+        let stream = pliant::output::rerun::into_recording(recording.clone(), outputs.plan(), &scene.system, &scene.state)?;
+        outputs.add_viewer(stream);
+        let summary = run(&scene, &mut outputs);
+        let report = closed(outputs, &summary);
+        assert!(report.files.iter().all(|f| f.problem.is_none() && f.frames == 61), "{:?}", report.files);
+        let logged = read(store.take())?;
+        let h5 = hdf5::File::open(&file)?;
+
+        let (series, rows) =
+            (&logged.scalars["/closures/rocker_pin/force"], h5.dataset("closures/rocker_pin/load_force")?.read_2d::<f64>()?);
+        assert_eq!(series.len(), 61);
+        for (values, row) in series.iter().zip(rows.rows()) {
+            assert_eq!(values[..3], row.to_vec()[..]);
+            assert_eq!(values[4], PIN_LIMIT);
+        }
+        assert_eq!(logged.names["/closures/rocker_pin/force"][4], "force limit (N)");
+        assert_eq!(logged.scalars["/closures/rocker_pin/moment"][0].len(), 4, "no limit, no line for one");
+
+        let (series, rows) = (&logged.scalars["/closures/cable\\/1/coordinate_force"], h5.dataset("closures/cable%2F1/coordinate_force")?);
+        for (values, force) in series.iter().zip(rows.read_raw::<f64>()?) {
+            assert_eq!(values[..], [force, force.abs(), CABLE_LIMIT]);
+        }
+        let names = ["coordinate force (N m)", "coordinate force magnitude (N m)", "coordinate force limit (N m)"];
+        assert_eq!(logged.names["/closures/cable\\/1/coordinate_force"], names);
+        assert_eq!(logged.scalars["/closures/rack/coordinate_force"].len(), 61);
+        assert_eq!(logged.scalars["/closures/rack/residual"].len(), 61);
+        assert_eq!(logged.names["/closures/rack/residual"], ["residual (m)"]);
+
+        assert_eq!(logged.arrows["/world/closures/rocker_pin/force"], 61);
+        assert!(
+            !logged.arrows.keys().any(|entity| entity.starts_with("/world/closures/rack")),
+            "a gear acts on a coordinate, not at a point"
+        );
+        assert!(logged.legend.contains("at closures, by a on b"), "{}", logged.legend);
+        Ok(())
+    }
 }

@@ -1,15 +1,19 @@
 //! What pictures need besides the data: boxes of rigid bodies, the extent and aspect of the scene, and one output time as a small message.
 //! Nothing here knows of a viewer.
 
+use super::channels::{closure_side, load_frame, load_side, residual_unit};
+use super::closure_load::{ClosureLoad, ClosureRecord};
 use super::frame::OutputFrame;
 use super::plan::{BodyBox, OutputPlan};
 use super::tracker::Event;
 use crate::dynamics::Workspace;
+use crate::dynamics::frame_motion::FramePose;
 use crate::dynamics::sweep::pose_outward::pose_outward;
 use crate::dynamics::world::{WorldFrame, hinge_frame, world_frames};
 use crate::integrate::Sample;
 use crate::model::Surface;
-use crate::model::{Body, BodyKind, HingeKind, State, System};
+use crate::model::{Body, BodyKind, ClosureJoint, ClosureSide, HingeKind, State, System};
+use crate::scene::closures::gear_unit;
 use crate::spatial::rotation::quaternion_of_matrix;
 use crate::spatial::shift::{angular, linear};
 use nalgebra::{Matrix3, SymmetricEigen, Vector3, Vector6};
@@ -75,6 +79,31 @@ pub struct HingePicture {
     pub carries: bool,
 }
 
+/// A closure whose load pictures show.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ClosurePicture {
+    /// Name of the closure.
+    pub name: String,
+    /// Who acts on whom.
+    pub side: String,
+    /// Of a gear: the unit of what it exerts on coordinate b.
+    pub gear_unit: Option<&'static str>,
+    /// Unit of the residual.
+    pub residual_unit: &'static str,
+    /// N m.
+    pub moment_limit: Option<f64>,
+    /// N.
+    pub force_limit: Option<f64>,
+}
+
+impl ClosurePicture {
+    /// Limit of what a gear exerts: only the one in its unit can be given.
+    #[must_use]
+    pub fn gear_limit(&self) -> Option<f64> {
+        self.moment_limit.or(self.force_limit)
+    }
+}
+
 /// All that stays the same over a run.
 #[derive(Debug, Clone)]
 pub struct Picture {
@@ -84,6 +113,8 @@ pub struct Picture {
     pub bodies: Vec<BodyPicture>,
     /// In the order of the plan's loaded hinges.
     pub hinges: Vec<HingePicture>,
+    /// In the order of the plan's loaded closures.
+    pub closures: Vec<ClosurePicture>,
     /// Factor on the deformation.
     pub deformation_scale: f64,
     /// Centre (m, inertial axes) of everything at the start.
@@ -102,11 +133,23 @@ impl Picture {
         let hinge = |body: usize| {
             let (moment_limit, force_limit) = plan.hinge_limits(body);
             let owner = &system.bodies[body];
-            let (side, frame) = (super::channels::load_side(system, owner), super::channels::load_frame(owner));
+            let (side, frame) = (load_side(system, owner), load_frame(owner));
             let hinge = &owner.hinge;
             let carries =
                 hinge.kind != HingeKind::Free || hinge.torque.is_some() || !hinge.stiffness.is_empty() || !hinge.damping.is_empty();
             HingePicture { name: hinge.name.clone(), body, side, frame, moment_limit, force_limit, carries }
+        };
+        let closure = |index: usize| {
+            let (moment_limit, force_limit) = plan.closure_limits(index);
+            let closure = &system.closures[index];
+            ClosurePicture {
+                name: closure.name.clone(),
+                side: closure_side(system, closure),
+                gear_unit: gear_unit(system, closure),
+                residual_unit: residual_unit(system, closure),
+                moment_limit,
+                force_limit,
+            }
         };
         let (low, high) = extent(system, &bodies, start);
         let (center, radius) = ((low + high) * 0.5, (0.5 * (high - low).norm()).max(1e-3));
@@ -115,6 +158,7 @@ impl Picture {
         Self {
             scene: plan.scene_name.clone(),
             hinges: plan.loaded_hinges().into_iter().map(hinge).collect(),
+            closures: plan.loaded_closures().into_iter().map(closure).collect(),
             bodies,
             deformation_scale: plan.deformation_scale,
             center: center.into(),
@@ -202,14 +246,25 @@ fn extent(system: &System, bodies: &[BodyPicture], start: &State) -> (Vector3<f6
 /// A load in a picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LoadSnapshot {
-    /// O in inertial axes (m).
+    /// O, or b's point of a closure, in inertial axes (m).
     pub point: [f64; 3],
     /// Inertial axes (N m).
     pub moment_world: [f64; 3],
     /// Inertial axes (N).
     pub force_world: [f64; 3],
-    /// (moment; force) in O axes.
+    /// (moment; force) in O axes, or in the axes of frame a of a closure.
     pub load: Vector6<f64>,
+}
+
+/// A closure in a picture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ClosureSnapshot {
+    /// Of a joint between frames: its load on b.
+    pub joint: Option<LoadSnapshot>,
+    /// Of a gear: what it exerts on coordinate b (N m or N).
+    pub gear: Option<f64>,
+    /// m or rad.
+    pub residual: f64,
 }
 
 /// One output time, small enough to be handed to another thread.
@@ -221,6 +276,8 @@ pub struct Snapshot {
     pub poses: Vec<([f64; 3], [f64; 4])>,
     /// Loads at the picture's hinges.
     pub loads: Vec<LoadSnapshot>,
+    /// The picture's closures.
+    pub closures: Vec<ClosureSnapshot>,
     /// Modal coordinates of all bodies.
     pub modal_position: Vec<f64>,
     /// What became known.
@@ -228,9 +285,9 @@ pub struct Snapshot {
 }
 
 impl Snapshot {
-    /// The snapshot of `sample` for the hinges of `picture`.
+    /// The snapshot of `sample` for hinges, by the bodies that they carry, and closures.
     #[must_use]
-    pub fn of(hinges: &[usize], sample: &Sample<'_>, frame: &OutputFrame, events: &[Event]) -> Self {
+    pub fn of(hinges: &[usize], closures: &[usize], sample: &Sample<'_>, frame: &OutputFrame, events: &[Event]) -> Self {
         let Sample { system, state, workspace, .. } = *sample;
         let pose = |(body, frame): (&Body, &WorldFrame)| {
             let frame = frame.body_frame(body);
@@ -245,8 +302,32 @@ impl Snapshot {
             time: state.time,
             poses: system.bodies.iter().zip(&frame.frames).map(pose).collect(),
             loads: hinges.iter().zip(&frame.loads).map(load).collect(),
+            closures: closures.iter().zip(&frame.closures).map(|(&i, record)| closure_snapshot(i, record, sample, &frame.frames)).collect(),
             modal_position: state.modal_position.clone(),
             events: events.iter().map(|e| (matches!(e, Event::Exceeded(_)), e.text())).collect(),
         }
     }
+}
+
+/// Pose of one frame of a closure in inertial axes.
+fn side_frame(system: &System, state: &State, side: &ClosureSide, frames: &[WorldFrame]) -> WorldFrame {
+    let (body, eta) = match side.body {
+        None => (WorldFrame::default(), &[][..]),
+        Some(k) => (frames[k], &state.modal_position[system.bodies[k].modal_range()]),
+    };
+    let own = FramePose::of(&side.attachment, eta);
+    WorldFrame { rotation: body.rotation * own.rotation, position: body.position + body.rotation * own.position }
+}
+
+fn closure_snapshot(index: usize, record: &ClosureRecord, sample: &Sample<'_>, frames: &[WorldFrame]) -> ClosureSnapshot {
+    let joint = match (&record.load, &sample.system.closures[index].joint) {
+        (ClosureLoad::Joint(load), ClosureJoint::Frames { a, b, .. }) => {
+            let [a, b] = [a, b].map(|side| side_frame(sample.system, sample.state, side, frames));
+            let turned = |x: Vector3<f64>| (a.rotation * x).into();
+            let (moment_world, force_world) = (turned(angular(load)), turned(linear(load)));
+            Some(LoadSnapshot { point: b.position.into(), moment_world, force_world, load: *load })
+        }
+        _ => None,
+    };
+    ClosureSnapshot { joint, gear: record.load.coordinate_force(), residual: record.residual }
 }

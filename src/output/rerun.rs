@@ -4,7 +4,7 @@
 //! updates, since static data would hide what is logged later under the same component. The SDK waits for ever if nobody takes its data, so
 //! every flush here has a time limit, and a stream that failed is not dropped but left to the end of the process.
 
-use super::picture::{BodyPicture, HingePicture, LoadSnapshot, Picture, Snapshot};
+use super::picture::{BodyPicture, ClosurePicture, ClosureSnapshot, LoadSnapshot, Picture, Snapshot};
 use super::plan::OutputPlan;
 use super::scales::{ColourMap, Scales, line_colour};
 use super::viewer::{FrameLog, ViewerError, ViewerStream, ViewerTarget, free_port, probe, spawn};
@@ -106,7 +106,7 @@ fn stream(
     recording.set_log_tick_enabled(false);
     let picture = Picture::new(system, plan, start);
     let log = RerunLog::new(recording, picture, end).map_err(|e| ViewerError::Setup { cause: e.to_string() })?;
-    ViewerStream::start(log, target, remedy, plan.loaded_hinges())
+    ViewerStream::start(log, target, remedy, plan.loaded_hinges(), plan.loaded_closures())
 }
 
 /// What the end of a stream has to see to.
@@ -121,9 +121,20 @@ fn path(parts: &[&str]) -> EntityPath {
     EntityPath::new(parts.iter().map(|part| EntityPathPart::new(*part)).collect())
 }
 
-/// Entity of a body; `hinges` under `world` is taken.
+/// Entity of a body; `hinges` and `closures` under `world` are taken.
 fn body_path(name: &str) -> EntityPath {
-    if name == "hinges" { path(&["world", "hinges (body)"]) } else { path(&["world", name]) }
+    match name {
+        "hinges" => path(&["world", "hinges (body)"]),
+        "closures" => path(&["world", "closures (body)"]),
+        _ => path(&["world", name]),
+    }
+}
+
+/// Names of the lines of a load, with colours.
+fn load_series(quantity: &str, unit: &str, limit: Option<f64>) -> rerun::SeriesLines {
+    let count = 4 + usize::from(limit.is_some());
+    let names = ["x", "y", "z", "magnitude", "limit"].iter().take(count).map(|part| format!("{quantity} {part} ({unit})"));
+    rerun::SeriesLines::new().with_names(names).with_colors(SERIES.into_iter().take(count))
 }
 
 fn below(parent: &EntityPath, part: &str) -> EntityPath {
@@ -196,13 +207,29 @@ impl RerunLog {
         }
         for hinge in &self.picture.hinges {
             for (quantity, unit, limit) in [("moment", "N m", hinge.moment_limit), ("force", "N", hinge.force_limit)] {
-                let count = 4 + usize::from(limit.is_some());
-                let names = ["x", "y", "z", "magnitude", "limit"].iter().take(count).map(|part| format!("{quantity} {part} ({unit})"));
-                let series = rerun::SeriesLines::new().with_names(names).with_colors(SERIES.into_iter().take(count));
-                rec.log_static(path(&["loads", &hinge.name, quantity]), &series)?;
+                rec.log_static(path(&["loads", &hinge.name, quantity]), &load_series(quantity, unit, limit))?;
             }
         }
-        Ok(())
+        self.picture.closures.iter().try_for_each(|closure| self.log_static_closure(closure))
+    }
+
+    fn log_static_closure(&self, closure: &ClosurePicture) -> RecordingStreamResult<()> {
+        let (rec, name) = (&self.recording, closure.name.as_str());
+        match closure.gear_unit {
+            Some(unit) => {
+                let count = 2 + usize::from(closure.gear_limit().is_some());
+                let names = ["", " magnitude", " limit"].iter().take(count).map(|part| format!("coordinate force{part} ({unit})"));
+                let series = rerun::SeriesLines::new().with_names(names).with_colors(SERIES.into_iter().skip(2).take(count));
+                rec.log_static(path(&["closures", name, "coordinate_force"]), &series)?;
+            }
+            None => {
+                for (quantity, unit, limit) in [("moment", "N m", closure.moment_limit), ("force", "N", closure.force_limit)] {
+                    rec.log_static(path(&["closures", name, quantity]), &load_series(quantity, unit, limit))?;
+                }
+            }
+        }
+        let residual = rerun::SeriesLines::new().with_names([format!("residual ({})", closure.residual_unit)]);
+        rec.log_static(path(&["closures", name, "residual"]), &residual)
     }
 
     fn log_frame(&mut self, snapshot: &Snapshot) -> RecordingStreamResult<()> {
@@ -218,7 +245,7 @@ impl RerunLog {
                 rescaled |= self.scales.stress.cover(peaks[k]);
             }
         }
-        for load in &snapshot.loads {
+        for load in snapshot.loads.iter().chain(snapshot.closures.iter().filter_map(|c| c.joint.as_ref())) {
             rescaled |= self.scales.moment.cover(load.load.fixed_rows::<3>(0).norm());
             rescaled |= self.scales.force.cover(load.load.fixed_rows::<3>(3).norm());
         }
@@ -226,7 +253,12 @@ impl RerunLog {
             self.log_legend()?;
         }
         self.log_bodies(snapshot, &peaks)?;
-        self.picture.hinges.iter().zip(&snapshot.loads).try_for_each(|(hinge, load)| self.log_load(hinge, load))?;
+        for (hinge, load) in self.picture.hinges.iter().zip(&snapshot.loads) {
+            self.log_load(["hinges", "loads"], &hinge.name, [hinge.moment_limit, hinge.force_limit], load)?;
+        }
+        for (closure, at) in self.picture.closures.iter().zip(&snapshot.closures) {
+            self.log_closure(closure, at)?;
+        }
         for (warning, text) in &snapshot.events {
             self.log_line(text, if *warning { rerun::TextLogLevel::WARN } else { rerun::TextLogLevel::INFO })?;
         }
@@ -262,11 +294,24 @@ impl RerunLog {
         Ok(())
     }
 
-    fn log_load(&self, hinge: &HingePicture, load: &LoadSnapshot) -> RecordingStreamResult<()> {
+    fn log_closure(&self, closure: &ClosurePicture, at: &ClosureSnapshot) -> RecordingStreamResult<()> {
+        let name = closure.name.as_str();
+        if let Some(load) = &at.joint {
+            self.log_load(["closures"; 2], name, [closure.moment_limit, closure.force_limit], load)?;
+        }
+        if let Some(force) = at.gear {
+            let values = [force, force.abs()].into_iter().chain(closure.gear_limit());
+            self.recording.log(path(&["closures", name, "coordinate_force"]), &rerun::Scalars::new(values))?;
+        }
+        self.recording.log(path(&["closures", name, "residual"]), &rerun::Scalars::single(at.residual))
+    }
+
+    /// Arrows under `world` in the first of `groups`, numbers in the second; `limits` are those of moment and force.
+    fn log_load(&self, groups: [&str; 2], name: &str, limits: [Option<f64>; 2], load: &LoadSnapshot) -> RecordingStreamResult<()> {
         let length = ARROW * self.picture.radius;
         let parts = [
-            ("moment", load.moment_world, 0, self.scales.moment, MOMENT, hinge.moment_limit),
-            ("force", load.force_world, 3, self.scales.force, FORCE, hinge.force_limit),
+            ("moment", load.moment_world, 0, self.scales.moment, MOMENT, limits[0]),
+            ("force", load.force_world, 3, self.scales.force, FORCE, limits[1]),
         ];
         for (quantity, vector, row, scale, colour, limit) in parts {
             let arrow = vector.map(|x| (length * scale.share(x)) as f32);
@@ -274,10 +319,10 @@ impl RerunLog {
                 .with_origins([single(load.point)])
                 .with_colors([colour])
                 .with_radii([(0.012 * self.picture.radius) as f32]);
-            self.recording.log(path(&["world", "hinges", &hinge.name, quantity]), &arrows)?;
+            self.recording.log(path(&["world", groups[0], name, quantity]), &arrows)?;
             let components = load.load.fixed_rows::<3>(row);
             let values = components.iter().copied().chain([components.norm()]).chain(limit);
-            self.recording.log(path(&["loads", &hinge.name, quantity]), &rerun::Scalars::new(values))?;
+            self.recording.log(path(&[groups[1], name, quantity]), &rerun::Scalars::new(values))?;
         }
         Ok(())
     }
@@ -354,8 +399,32 @@ fn ends_in_footer(file: &Path) -> bool {
     read.is_ok() && tail.windows(4).any(|word| word == b"FOOT")
 }
 
-/// Most hinges whose plots are all open at once; with more, each has a tab.
-const OPEN_HINGES: usize = 3;
+/// Most hinges and closures whose plots are all open at once; with more, each has a tab.
+const OPEN_PLOTS: usize = 3;
+
+/// A hinge or closure with plots of its load.
+struct Plotted<'p> {
+    group: &'static str,
+    name: &'p str,
+    side: &'p str,
+    /// Entity, words and unit of each plot.
+    quantities: Vec<(&'static str, &'static str, &'static str)>,
+}
+
+/// What has plots, two each and in this order; gears, which have one, come last.
+fn plotted<'p>(picture: &'p Picture) -> Vec<Plotted<'p>> {
+    let spatial = || vec![("moment", "moment", "N m"), ("force", "force", "N")];
+    let hinges = picture.hinges.iter().filter(|h| h.carries);
+    let hinges = hinges.map(|h| Plotted { group: "loads", name: &h.name, side: &h.side, quantities: spatial() });
+    let of_closure = |c: &'p ClosurePicture, quantities| Plotted { group: "closures", name: &c.name, side: &c.side, quantities };
+    let joints = picture.closures.iter().filter(|c| c.gear_unit.is_none()).map(|c| of_closure(c, spatial()));
+    let gears = picture.closures.iter().filter_map(|c| {
+        let unit = c.gear_unit?;
+        let words = if unit == "N" { "force" } else { "moment" };
+        Some(of_closure(c, vec![("coordinate_force", words, unit)]))
+    });
+    hinges.chain(joints).chain(gears).collect()
+}
 
 /// Properties of views by entity in the blueprint's store: the blueprint builder has none for these kinds of view.
 type Properties = Vec<(EntityPath, Box<dyn AsComponents>)>;
@@ -385,18 +454,18 @@ fn layout(picture: &Picture, properties: &mut Properties) -> Blueprint {
         set(&view, "PlotLegend", Box::new(PlotLegend::new().with_visible(named)));
         view
     };
-    let mut plots_of = |hinge: &HingePicture| {
-        let mut of = |quantity: &str, unit| {
-            plot(format!("{}: {quantity} {}, {unit}", hinge.name, hinge.side), path(&["loads", &hinge.name, quantity]), false)
+    let mut loads = Vec::new();
+    for Plotted { group, name, side, quantities } in plotted(picture) {
+        let of = |(quantity, words, unit): &(&str, &str, &str)| {
+            plot(format!("{name}: {words} {side}, {unit}"), path(&[group, name, quantity]), false)
         };
-        [of("moment", "N m"), of("force", "N")]
-    };
-    let loads: Vec<_> = picture.hinges.iter().filter(|h| h.carries).map(|h| (h, plots_of(h))).collect();
+        loads.push((name, quantities.iter().map(of).collect::<Vec<_>>()));
+    }
     let count = loads.len();
     let loads: Option<ContainerLike> = match count {
         0 => None,
-        1..=OPEN_HINGES => Some(Grid::new(loads.into_iter().flat_map(|(_, plots)| plots)).with_grid_columns(2).into()),
-        _ => Some(Tabs::new(loads.into_iter().map(|(h, plots)| Vertical::new(plots).with_name(h.name.as_str()).into())).into()),
+        1..=OPEN_PLOTS => Some(Grid::new(loads.into_iter().flat_map(|(_, plots)| plots)).with_grid_columns(2).into()),
+        _ => Some(Tabs::new(loads.into_iter().map(|(name, plots)| Vertical::new(plots).with_name(name).into())).into()),
     };
     let stressed = picture.bodies.iter().any(|b| b.surface.as_ref().is_some_and(|s| s.stress));
     let stress = stressed.then(|| plot("von Mises peak, MPa".into(), path(&["stress"]), true));
@@ -405,7 +474,7 @@ fn layout(picture: &Picture, properties: &mut Properties) -> Blueprint {
     let modes = (!modes.is_empty()).then(|| Tabs::new(modes).into());
     let lower: Vec<ContainerLike> = stress.into_iter().chain(modes).collect();
     let lower = (!lower.is_empty()).then(|| Horizontal::new(lower).into());
-    let shares: Vec<f32> = loads.iter().map(|_| count.min(OPEN_HINGES) as f32).chain(lower.iter().map(|_| 1.0)).collect();
+    let shares: Vec<f32> = loads.iter().map(|_| count.min(OPEN_PLOTS) as f32).chain(lower.iter().map(|_| 1.0)).collect();
     let right: Vec<ContainerLike> = loads.into_iter().chain(lower).collect();
     let left = Vertical::new([space, Horizontal::new([legend, events]).into()]).with_row_shares(vec![2.6, 1.0]);
     let columns: Vec<ContainerLike> =

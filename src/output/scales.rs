@@ -74,10 +74,15 @@ impl Scales {
     #[must_use]
     pub fn legend(&self, picture: &Picture) -> String {
         let end = if self.stress.fixed { ", the limit, and above" } else { "" };
+        let (by, about) = if picture.closures.iter().any(|c| c.gear_unit.is_none()) {
+            ("; at closures, by a on b", "; of closures, about b's point in a's axes")
+        } else {
+            ("", "")
+        };
         format!(
             "**Colour**: von Mises stress, {} from dark = 0 to yellow = **{}**{end}\n\n\
-             **Arrows** at hinges, by parent on child: orange moment, longest **{} N m**; blue force, longest **{} N**\n\n\
-             **Plots** of loads, about O in O axes: red x, green y, blue z, white magnitude, yellow limit\n\n\
+             **Arrows** at hinges, by parent on child{by}: orange moment, longest **{} N m**; blue force, longest **{} N**\n\n\
+             **Plots** of loads, about O in O axes{about}: red x, green y, blue z, white magnitude, yellow limit\n\n\
              Deformation drawn **x {}**",
             ColourMap::NAME,
             megapascal(self.stress.full),

@@ -163,7 +163,7 @@ impl Observer for OutputSet<'_> {
             self.results = None;
         }
         if let Some(viewer) = &mut self.viewer {
-            let snapshot = Snapshot::of(viewer.hinges(), sample, frame, &self.tracker.events);
+            let snapshot = Snapshot::of(viewer.hinges(), viewer.closures(), sample, frame, &self.tracker.events);
             viewer.send(snapshot);
         }
         Flow::Continue

@@ -173,6 +173,7 @@ pub struct ViewerStream {
     target: String,
     remedy: &'static str,
     hinges: Vec<usize>,
+    closures: Vec<usize>,
     sender: Option<Sender<Message>>,
     done: Receiver<(u64, Result<(), String>)>,
     sent: u64,
@@ -180,11 +181,18 @@ pub struct ViewerStream {
 }
 
 impl ViewerStream {
-    /// Starts the thread. `hinges` are the bodies whose hinge loads `log` shows, `remedy` what to do if the stream is lost.
+    /// Starts the thread. `remedy` is what to do if the stream is lost; `log` shows the loads of the hinges that carry the bodies `hinges`,
+    /// and those of `closures`.
     ///
     /// # Errors
     /// If the system gives no thread.
-    pub fn start(mut log: impl FrameLog, target: String, remedy: &'static str, hinges: Vec<usize>) -> Result<Self, ViewerError> {
+    pub fn start(
+        mut log: impl FrameLog,
+        target: String,
+        remedy: &'static str,
+        hinges: Vec<usize>,
+        closures: Vec<usize>,
+    ) -> Result<Self, ViewerError> {
         let (sender, receiver) = bounded::<Message>(IN_FLIGHT);
         let (finished, done) = bounded(1);
         let work = move || {
@@ -199,7 +207,7 @@ impl ViewerStream {
         };
         let thread = std::thread::Builder::new().name("viewer".into()).spawn(work);
         thread.map_err(|e| ViewerError::Setup { cause: e.to_string() })?;
-        Ok(Self { target, remedy, hinges, sender: Some(sender), done, sent: 0, lost: None })
+        Ok(Self { target, remedy, hinges, closures, sender: Some(sender), done, sent: 0, lost: None })
     }
 
     /// Path or address.
@@ -212,6 +220,12 @@ impl ViewerStream {
     #[must_use]
     pub fn hinges(&self) -> &[usize] {
         &self.hinges
+    }
+
+    /// Closures whose loads a snapshot holds.
+    #[must_use]
+    pub fn closures(&self) -> &[usize] {
+        &self.closures
     }
 
     /// Hands over one output time.
