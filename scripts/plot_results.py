@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Plot a results file of `pliant run`: hinge loads, stress, modal coordinates and the energy balance.
+"""Plot a results file of `pliant run`: loads at hinges and closures, stress, modal coordinates and the energy balance.
 
 Example: scripts/plot_results.py run.h5 --hinge drive --out run.png
 """
@@ -22,7 +22,7 @@ def text(attributes, name, default=""):
     return value.decode() if isinstance(value, bytes) else str(value)
 
 
-def plot_load(axes, time, dataset, hinge):
+def plot_load(axes, time, dataset, owner):
     """Components and magnitude of one load, with unit, frame and side."""
     values = dataset[:]
     for component, label in zip(values.T, "xyz"):
@@ -30,8 +30,33 @@ def plot_load(axes, time, dataset, hinge):
     axes.plot(time, np.linalg.norm(values, axis=1), "k", label="magnitude", linewidth=1)
     quantity = dataset.name.rsplit("_", 1)[-1]
     about = f" about {text(dataset.attrs, 'point')}" if quantity == "moment" else ""
-    axes.set_title(f"{hinge}: {quantity}{about}, {text(dataset.attrs, 'side')}\nin {text(dataset.attrs, 'frame')}", fontsize=8)
+    axes.set_title(f"{owner}: {quantity}{about}, {text(dataset.attrs, 'side')}\nin {text(dataset.attrs, 'frame')}", fontsize=8)
     axes.set_ylabel(text(dataset.attrs, "unit"))
+
+
+def plot_gear(axes, time, dataset, owner):
+    """What a gear exerts on coordinate b, with unit and side."""
+    axes.plot(time, dataset[:], label="on b", linewidth=1)
+    quantity = "moment" if text(dataset.attrs, "unit") == "N m" else "force"
+    axes.set_title(f"{owner}: {quantity} of the gear,\n{text(dataset.attrs, 'side')}", fontsize=8)
+    axes.set_ylabel(text(dataset.attrs, "unit"))
+
+
+def plot_residuals(axes, time, closures):
+    """How far closures are from closed."""
+    for name, group in closures.items():
+        axes.plot(time, group["residual"][:], label=name, linewidth=1)
+    axes.set_title("closures: residual", fontsize=8)
+    axes.set_ylabel("m or rad")
+
+
+def named(file, kind, names):
+    """Groups of a kind by name, those asked for or all."""
+    known = {unquote(name): group for name, group in file.get(f"{kind}s", {}).items()}
+    missing = [name for name in names or [] if name not in known]
+    if missing:
+        sys.exit(f"no loads of {kind} {missing[0]} in the file; it has {', '.join(known) or 'none'}")
+    return known if names is None else {name: known[name] for name in names}
 
 
 def plot_balance(axes, time, energy):
@@ -45,18 +70,19 @@ def plot_balance(axes, time, energy):
     axes.set_ylabel("J")
 
 
-def plot(file, hinges):
-    """One figure of everything in the file."""
+def plot(file, hinges, closures):
+    """One figure of everything in the file, or of the loads named."""
     time = file["time"][:]
-    known = {unquote(name): group for name, group in file.get("hinges", {}).items()}
-    missing = [name for name in hinges or [] if name not in known]
-    if missing:
-        sys.exit(f"no loads of hinge {missing[0]} in the file; it has {', '.join(known) or 'none'}")
+    if hinges or closures:
+        hinges, closures = hinges or [], closures or []
+    hinges, closures = named(file, "hinge", hinges), named(file, "closure", closures)
     panels = []
-    for name in hinges or known:
-        for quantity in ("load_moment", "load_force"):
-            dataset = known[name][quantity]
-            panels.append(lambda axes, dataset=dataset, name=name: plot_load(axes, time, dataset, name))
+    for name, group in [*hinges.items(), *closures.items()]:
+        for quantity, draw in (("load_moment", plot_load), ("load_force", plot_load), ("coordinate_force", plot_gear)):
+            if quantity in group:
+                panels.append(lambda axes, draw=draw, dataset=group[quantity], name=name: draw(axes, time, dataset, name))
+    if closures:
+        panels.append(lambda axes: plot_residuals(axes, time, closures))
     bodies = {unquote(name): group for name, group in file["bodies"].items()}
     stressed = {name: group["von_mises_peak"] for name, group in bodies.items() if "von_mises_peak" in group}
 
@@ -99,12 +125,13 @@ def main():
     parser.add_argument("file", help="results file (.h5)")
     parser.add_argument("--out", help="picture to write; default: the file's name with .png")
     parser.add_argument("--hinge", action="append", help="hinge to show; may be repeated; default: all")
+    parser.add_argument("--closure", action="append", help="closure to show; may be repeated; default: all")
     arguments = parser.parse_args()
     try:
         with h5py.File(arguments.file) as file:
             if text(file.attrs, "format") != "pliant-results":
                 sys.exit(f"{arguments.file}: no results file of pliant")
-            figure = plot(file, arguments.hinge)
+            figure = plot(file, arguments.hinge, arguments.closure)
     except OSError as error:
         sys.exit(f"{arguments.file}: {error}")
     out = arguments.out or arguments.file.removesuffix(".h5") + ".png"

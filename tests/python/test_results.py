@@ -58,3 +58,27 @@ def test_the_plot_script_draws_a_results_file(run, tmp_path):
     done = subprocess.run([sys.executable, ROOT / "scripts" / "plot_results.py", run[0], "--out", picture], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert picture.read_bytes().startswith(b"\x89PNG") and picture.stat().st_size > 20_000
+
+
+def test_loads_at_closures_are_read_and_drawn(tmp_path):
+    if not PROGRAM.exists():
+        pytest.skip("target/release/pliant is not built")
+    results, picture = tmp_path / "run.h5", tmp_path / "plot.png"
+    scene = ROOT / "examples" / "06_four_bar" / "scene.toml"
+    done = subprocess.run([PROGRAM, "run", scene, "--duration", "1", "--out", results, "--json"], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    report = json.loads(done.stdout)
+    with h5py.File(results) as file:
+        force = file["closures/rocker_pin/load_force"][:]
+    end = report["final"]["closures"]["rocker_pin"]["load"]["force"]
+    # the last row is evaluated at the interpolant of the last step, projected onto the closures
+    assert np.linalg.norm(force[-1] - end) < 1e-9 * np.linalg.norm(end)
+    peak = np.linalg.norm(force, axis=1).max()
+    assert peak <= report["peaks"]["closures"]["rocker_pin"]["force"] * (1 + 4 * np.finfo(float).eps)
+
+    draw = [sys.executable, ROOT / "scripts" / "plot_results.py", results, "--out", picture]
+    done = subprocess.run(draw, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert picture.read_bytes().startswith(b"\x89PNG") and picture.stat().st_size > 20_000
+    done = subprocess.run([*draw, "--closure", "pin"], capture_output=True, text=True)
+    assert done.returncode != 0 and "no loads of closure pin in the file; it has rocker_pin" in done.stderr
