@@ -10,6 +10,7 @@ use super::tableau::Tableau;
 use super::w_tableau::ROS34PW2;
 use super::{Stepper, tableau};
 use crate::dynamics::closed_chain::drift;
+use crate::dynamics::closed_chain::schur::REDUNDANT;
 use crate::dynamics::{DynamicsError, Workspace, forward_dynamics};
 use crate::model::{State, System};
 use thiserror::Error;
@@ -89,6 +90,18 @@ pub enum RunFailure {
         /// What to do.
         remedy: &'static str,
     },
+    /// Loops that lose rank where the error control cannot pass.
+    #[error(
+        "at t = {time} s the loops pass a change point, where they lose rank{}; hold the closures by constraint_embedding, take fixed steps (rk4) or \
+         loosen relative_tolerance",
+        source.as_ref().map_or_else(String::new, |s| format!(" ({s})"))
+    )]
+    ChangePoint {
+        /// s.
+        time: f64,
+        /// What an evaluation there said, if it failed.
+        source: Option<DynamicsError>,
+    },
     /// A loop that came open.
     #[error("at t = {time} s closure \"{closure}\" came open by {residual:e} m or rad; take smaller steps or a smaller relative_tolerance")]
     Opened {
@@ -157,6 +170,7 @@ pub fn simulate(system: &System, start: &State, settings: &Settings, observers: 
         chart: &mut chart,
         controller: stepper.controlled_order().map(Controller::new),
         step,
+        accepted: step,
         largest,
         relative: tolerance.map_or(0.0, |t| t.relative),
         output: Workspace::new(system),
@@ -219,6 +233,8 @@ struct Run<'r, 's> {
     chart: &'r mut Chart<'s>,
     controller: Option<Controller>,
     step: f64,
+    /// The last accepted step.
+    accepted: f64,
     largest: f64,
     relative: f64,
     output: Workspace,
@@ -282,7 +298,10 @@ impl Run<'_, '_> {
     /// Takes back what the last step drifted off the closures.
     fn hold_closures(&mut self, stepper: &mut dyn Stepper) -> Result<(), RunFailure> {
         let time = self.chart.base.time;
-        let wrap = |source| RunFailure::Dynamics { time, source };
+        let near = self.chart.nearest_rank_loss < CHANGE_POINT;
+        let wrap = |source| {
+            if near { RunFailure::ChangePoint { time, source: Some(source) } } else { RunFailure::Dynamics { time, source } }
+        };
         let chart = &mut *self.chart;
         let drift = drift::project(chart.system, &mut chart.base, &mut chart.workspace).map_err(wrap)?;
         if drift.position > OPEN {
@@ -293,6 +312,8 @@ impl Run<'_, '_> {
 
     /// Finds a step towards `stop` that meets the tolerance; returns its length.
     fn advance(&mut self, stepper: &mut dyn Stepper, stop: f64) -> Result<f64, RunFailure> {
+        // near a change point of the loops rounding grows without bound, and smaller steps only come closer to it: they are leapt over
+        let (mut nearest, mut tries, mut leaps) = (f64::INFINITY, 0, LEAPS.iter());
         loop {
             let time = self.chart.base.time;
             let left = (stop - time) - self.chart.clock_rest;
@@ -307,9 +328,8 @@ impl Run<'_, '_> {
             let floor = 16.0 * f64::EPSILON * time.abs().max(stop.abs());
             if step < floor && step < left {
                 let place = fastest_place(self.chart);
-                if self.chart.workspace.distance_to_rank_loss() < CHANGE_POINT && self.chart.base.is_finite() {
-                    let place = format!("{place}, at a change point of the loops, which fixed steps (rk4) pass");
-                    return Err(RunFailure::StepUnderflow { time, step, place });
+                if nearest < CHANGE_POINT && self.chart.base.is_finite() {
+                    return Err(RunFailure::ChangePoint { time, source: None });
                 }
                 return Err(if self.sampled.is_finite() && self.sampled.time > time {
                     RunFailure::StepUnderflow { time, step, place }
@@ -317,6 +337,7 @@ impl Run<'_, '_> {
                     RunFailure::NotFinite { time, place, remedy: "look at the loads and springs that act there" }
                 });
             }
+            self.chart.nearest_rank_loss = f64::INFINITY;
             let attempted = stepper.attempt(self.chart, step);
             let Some(controller) = &mut self.controller else {
                 let diverged = match attempted {
@@ -337,10 +358,16 @@ impl Run<'_, '_> {
                 }
                 return Ok(step);
             };
+            let here = self.chart.nearest_rank_loss;
+            nearest = nearest.min(here);
+            // near a change point the estimate cannot be smaller than what the loop inertia's rounding makes of accelerations
+            let rounding = REDUNDANT / (here * here * self.relative);
+            let allowed = if here < CHANGE_POINT { rounding.clamp(1.0, LARGEST_ROUNDING) } else { 1.0 };
             match attempted {
-                Ok(Some(error)) if error <= 1.0 => {
+                Ok(Some(error)) if error <= allowed => {
                     self.local_error = self.local_error.max(error * self.relative);
-                    let proposed = step * controller.accepted(error);
+                    let proposed = step * controller.accepted(error.min(1.0));
+                    self.accepted = step;
                     // a step cut short by a stop says nothing against the one that was planned
                     self.step = if step < self.step { proposed.max(self.step) } else { proposed }.min(self.largest);
                     return Ok(step);
@@ -354,9 +381,20 @@ impl Run<'_, '_> {
                     self.rejected += 1;
                     self.step = 0.1 * step;
                     if self.step < floor {
-                        return Err(RunFailure::Dynamics { time, source });
+                        return Err(if nearest < CHANGE_POINT {
+                            RunFailure::ChangePoint { time, source: Some(source) }
+                        } else {
+                            RunFailure::Dynamics { time, source }
+                        });
                     }
                 }
+            }
+            tries += 1;
+            if tries >= LEAP_AFTER
+                && nearest < CHANGE_POINT
+                && let Some(share) = leaps.next()
+            {
+                self.step = (self.accepted * share).min(self.largest);
             }
         }
     }
@@ -411,6 +449,12 @@ const OPEN: f64 = 1e-6;
 
 /// Relative singular value of the loops below which a step that fails does so at a change point.
 const CHANGE_POINT: f64 = 1e-2;
+/// Rejected tries of one step after which a change point is leapt over.
+const LEAP_AFTER: usize = 3;
+/// Shares of the last accepted step that a leap takes, in turn: some stage of one may fall on the change point itself.
+const LEAPS: [f64; 6] = [1.0, 0.6, 1.5, 0.8, 0.4, 2.0];
+/// Most that rounding may make of the error estimate at a change point, in units of the tolerance; the report's local error shows it.
+const LARGEST_ROUNDING: f64 = 1e3;
 
 /// The closure that is furthest open at the poses in `workspace`.
 fn opened(system: &System, workspace: &Workspace, time: f64) -> RunFailure {

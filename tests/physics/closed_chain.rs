@@ -11,6 +11,7 @@ use pliant::dynamics::hinge_load::hinge_load;
 use pliant::dynamics::inverse::NewtonEuler;
 use pliant::dynamics::world::{WorldFrame, hinge_frame, world_frames};
 use pliant::dynamics::{DynamicsError, Workspace, dense, forward_dynamics};
+use pliant::integrate::{Outcome, Settings, simulate};
 use pliant::model::build::{BodyDefinition, BodyDefinitionKind, Definition, Frame, HingeDefinition, WORLD};
 use pliant::model::build_closure::ClosureDefinition;
 use pliant::model::modal_body::Boundary;
@@ -441,4 +442,33 @@ fn loop_that_closes_on_a_flexible_interface_conserves_energy() {
         }
         assert_eq!(runs, 5);
     }
+}
+
+/// C01 with error control: through the change points, or a message that names them and what to do.
+#[test]
+fn two_four_bars_pass_their_change_points_with_error_control_or_say_why_not() {
+    let mut passed = [0, 0];
+    for (m, method) in METHODS.into_iter().enumerate() {
+        for tolerance in [1e-6, 1e-8, 1e-10, 1e-11] {
+            let (system, start) = row_of_four_bars(2, method);
+            let settings = Settings { duration: 10.0, method: dormand_prince(tolerance), rate_hz: 1.0 };
+            let summary = simulate(&system, &start, &settings, &mut []);
+            let q = summary.end.position[system.bodies[system.hinge_index("foot0").unwrap()].position];
+            let error = (q.cos() - 0.328_458_111_540_815_4).abs();
+            println!(
+                "{method} {tolerance:e}: {:?}, off by {error:e}, {} steps, {} rejected",
+                summary.outcome, summary.steps, summary.rejected
+            );
+            match summary.outcome {
+                // the error per step adds up over some hundred steps, and rounding near the change points leaves 1e-8
+                Outcome::Completed => {
+                    assert!(error < 1e3 * tolerance + 5e-8, "{method} {tolerance:e}: {error:e}");
+                    passed[m] += 1;
+                }
+                Outcome::Failed(failure) => assert!(failure.to_string().contains("change point"), "{failure}"),
+                Outcome::Stopped => panic!("nobody asked"),
+            }
+        }
+    }
+    assert!(passed[0] >= 2 && passed[1] == 4, "{passed:?}");
 }

@@ -10,6 +10,7 @@ mod convergence;
 mod extremes;
 mod first_principles;
 mod identities;
+mod loop_cost;
 mod nodal_sums;
 mod published;
 mod published_flexible;
