@@ -136,7 +136,7 @@ const ROCKER: f64 = 1.5;
 
 /// The four-bar cut at joint `cut`: A crank-ground, B crank-coupler, C coupler-rocker, D rocker-ground. Rods from A to D along the loop,
 /// the rocker from D to C.
-fn four_bar(cut: char, method: &str) -> (System, State) {
+pub fn four_bar(cut: char, method: &str) -> (System, State) {
     let bodies = vec![rod("crank", CRANK), rod("coupler", COUPLER), rod("rocker", ROCKER)];
     let ground = [2.0, 0.0, 0.0];
     let end = |l: f64| [l, 0.0, 0.0];

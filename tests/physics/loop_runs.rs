@@ -1,0 +1,86 @@
+//! Loops over long times: closed to rounding, with the energy drift of the integrator and no other.
+
+use crate::closed_chain::four_bar;
+use crate::support::scenes::{dormand_prince, rk4};
+use pliant::dynamics::Workspace;
+use pliant::dynamics::closed_chain::drift;
+use pliant::dynamics::energy::balance;
+use pliant::dynamics::world::WorldFrame;
+use pliant::integrate::simulate::Method;
+use pliant::integrate::{Flow, Observer, Outcome, Sample, Settings, simulate};
+use std::f64::consts::TAU;
+
+/// What a long run is watched for.
+struct Watch {
+    /// Turns of the crank.
+    periods: usize,
+    /// Crank angle at the start.
+    angle: f64,
+    /// Total energy (J) at the start, and its largest change.
+    energy: Option<f64>,
+    drift: f64,
+    /// Largest residuals: m or rad, and per second.
+    residuals: [f64; 2],
+    limit: usize,
+    frames: Vec<WorldFrame>,
+    measure: Workspace,
+}
+
+impl Observer for Watch {
+    fn observe(&mut self, sample: &Sample<'_>) -> Flow {
+        self.periods = ((sample.state.position[0] - self.angle).abs() / TAU) as usize;
+        let energy = balance(sample.system, sample.state, sample.workspace, &mut self.frames).0.total();
+        self.drift = self.drift.max((energy - *self.energy.get_or_insert(energy)).abs());
+        let found = drift::measure(sample.system, sample.state, &mut self.measure);
+        self.residuals = [self.residuals[0].max(found.position), self.residuals[1].max(found.rate)];
+        if self.periods >= self.limit { Flow::Stop } else { Flow::Continue }
+    }
+}
+
+fn watched(method: &str, by: Method, periods: usize) -> (Watch, f64, u64) {
+    let (system, start) = four_bar('D', method);
+    let mut watch = Watch {
+        periods: 0,
+        angle: start.position[0],
+        energy: None,
+        drift: 0.0,
+        residuals: [0.0; 2],
+        limit: periods,
+        frames: vec![WorldFrame::default(); system.bodies.len()],
+        measure: Workspace::new(&system),
+    };
+    // a turn takes about a second
+    let settings = Settings { duration: 4.0 * periods as f64, method: by, rate_hz: 13.0 };
+    let summary = simulate(&system, &start, &settings, &mut [&mut watch]);
+    assert_eq!((summary.outcome, watch.periods), (Outcome::Stopped, periods));
+    (watch, summary.time, summary.steps)
+}
+
+fn runs_long(method: &str, allowed: f64) {
+    let run = |by: Method, periods| {
+        let (watch, time, steps) = watched(method, by, periods);
+        println!(
+            "{method}, {}: {periods} turns, {time:.0} s, {steps} steps; residuals {:?}, energy off by {:e} J",
+            by.name(),
+            watch.residuals,
+            watch.drift
+        );
+        watch
+    };
+    let (long, short) = (run(dormand_prince(1e-6), 10_000), run(dormand_prince(1e-6), 1_000));
+    assert!(long.residuals[0] < allowed && long.residuals[1] < allowed, "{:?}", long.residuals);
+    // the integrator's drift and no other: steady in time, and for rk4 of the order h^5
+    let growth = long.drift / short.drift;
+    let gain = run(rk4(8e-3), 200).drift / run(rk4(4e-3), 200).drift;
+    assert!(growth > 5.0 && growth < 20.0 && gain > 20.0 && gain < 50.0, "growth {growth}, gain {gain}");
+}
+
+#[test]
+fn cut_four_bar_stays_closed_over_ten_thousand_turns_with_the_energy_drift_of_the_integrator() {
+    runs_long("tree_augmented", 1e-8);
+}
+
+#[test]
+fn embedded_four_bar_stays_closed_over_ten_thousand_turns_with_the_energy_drift_of_the_integrator() {
+    runs_long("constraint_embedding", 1e-10);
+}
