@@ -180,16 +180,27 @@ fn overrides_change_the_scene_and_faulty_ones_are_refused() {
 }
 
 #[test]
-fn the_implicit_method_is_refused_for_loops_and_auto_avoids_it() {
+fn loops_run_by_every_method_and_integrator_and_the_report_says_which() {
     let example = root().join("examples/06_four_bar/scene.toml");
-    let done = pliant(&["run", example.to_str().unwrap(), "--integrator", "rosenbrock_w"]);
-    assert_eq!(done.status.code(), Some(2));
-    assert!(text(&done.stderr).contains("does not integrate scenes with closures"), "{}", text(&done.stderr));
-    let done = pliant(&["run", example.to_str().unwrap(), "--json"]);
-    assert_eq!(done.status.code(), Some(0), "{}", text(&done.stderr));
-    let report: Value = serde_json::from_slice(&done.stdout).unwrap();
-    // positions are projected until they close to 1e-10
-    assert!(report["errors"]["closure"].as_f64().unwrap() < 1e-10 && report["integrator"] == "dormand_prince");
+    let example = example.to_str().unwrap();
+    let mut ends = Vec::new();
+    for (method, integrator) in [("auto", "auto"), ("constraint_embedding", "rosenbrock_w"), ("tree_augmented", "rosenbrock_w")] {
+        let done = pliant(&["run", example, "--duration", "1", "--closure-method", method, "--integrator", integrator, "--json"]);
+        assert_eq!(done.status.code(), Some(0), "{}", text(&done.stderr));
+        let said = text(&done.stderr);
+        let expected = if method == "auto" { "closures: 1 by tree_augmented (auto: " } else { &format!("closures: 1 by {method}") };
+        assert!(said.contains(expected), "{said}");
+        let report: Value = serde_json::from_slice(&done.stdout).unwrap();
+        // positions are closed to rounding, or projected until they close to 1e-10
+        assert!(report["errors"]["closure"].as_f64().unwrap() < 1e-10);
+        assert_eq!(report["integrator"], if integrator == "auto" { "dormand_prince" } else { integrator });
+        ends.push(report["final"]["hinges"]["crank_foot"]["position"][0].as_f64().unwrap());
+    }
+    // a relative tolerance of 1e-9 over some hundred steps
+    assert!(ends.iter().all(|e| (e - ends[0]).abs() < 1e-6), "{ends:?}");
+    let wrong = pliant(&["eval", example, "--closure-method", "embedding"]);
+    assert_eq!(wrong.status.code(), Some(2));
+    assert!(text(&wrong.stderr).contains("known: auto, tree_augmented, constraint_embedding"), "{}", text(&wrong.stderr));
 }
 
 #[test]

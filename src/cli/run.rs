@@ -8,6 +8,8 @@ use crate::dynamics::{Workspace, forward_dynamics};
 use crate::integrate::simulate::Method;
 use crate::integrate::stability::fastest_mode;
 use crate::integrate::{Flow, Observer, Outcome, Sample, Settings, simulate};
+use crate::model::aggregate::{LARGE_LOOP, MANY_LOOPS};
+use crate::model::{ClosureMethod, System};
 use crate::output::{OutputPlan, OutputSet};
 use crate::scene::{Overrides, Scene, SceneError, assemble};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -259,12 +261,27 @@ fn announce(scene: &Scene, settings: &Settings, left_out: &[String]) {
     if let Some(reason) = &scene.method_reason {
         lines.push(format!("integrator chosen: {reason}"));
     }
+    lines.extend(closure_methods(system));
     lines.push(format!("left out: {}", left_out.join(", ")));
     let mut sink = std::io::stderr().lock();
     for line in lines {
         // nothing is lost if standard error is closed
         let _ = writeln!(sink, "{line}");
     }
+}
+
+/// How closures are held, and why where that was left to the program; nothing without closures.
+fn closure_methods(system: &System) -> Option<String> {
+    let embedded = system.closures.iter().filter(|c| c.method == ClosureMethod::ConstraintEmbedding).count();
+    let (count, aggregates) = (system.closures.len(), system.aggregates.len());
+    let how = match (count - embedded, embedded) {
+        (0, 0) => return None,
+        (_, 0) => format!("{count} by tree_augmented"),
+        (0, _) => format!("{count} by constraint_embedding, in {aggregates} aggregate bodies"),
+        (cut, _) => format!("{cut} by tree_augmented, {embedded} by constraint_embedding in {aggregates} aggregate bodies"),
+    };
+    let why = format!(" (auto: loops are embedded from {MANY_LOOPS} independent ones of up to {LARGE_LOOP} coordinates on)");
+    Some(format!("closures: {how}{}", if system.closures.iter().any(|c| c.chosen) { &why } else { "" }))
 }
 
 /// Progress bar and Ctrl-C.

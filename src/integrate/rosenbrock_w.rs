@@ -20,6 +20,10 @@
 //! the step's start, since W-methods have their order only if all stages share one `A`. A stage costs one plain evaluation
 //! and two sweeps ([`response`]). K of a full modal stiffness is its diagonal. Prescribed hinges have no rows, and df/dt no term.
 //!
+//! Closures: x must not open them, so that `G x = 0` with G at the step's start. Embedded ones see to that themselves, since the sweeps
+//! solve for independent coordinates; cut ones by multipliers on the same factored matrix. The Jacobian is then that of the closed system
+//! but for the curvature of the closures.
+//!
 //! What is not resolved is damped: an undamped mode loses of its energy in one period, from |R| on the imaginary axis, 8e-8 at 1000
 //! steps per period, 8e-5 at 100, 1e-3 at 40, 1e-2 at 20, 0.3 at 5.
 //!
@@ -31,6 +35,7 @@ use super::runge_kutta::{combine, hermite};
 use super::step_control::{Tolerance, error_norm};
 use super::w_tableau::{STAGES, WTableau};
 use crate::dynamics::DynamicsError;
+use crate::dynamics::closed_chain::ClosedChain;
 use crate::dynamics::sweep::inertia_inward::{AddedInertia, InertiaScratch, inertia_inward_with};
 use crate::dynamics::sweep::pose_outward::{PoseScratch, pose_outward};
 use crate::dynamics::sweep::response::Response;
@@ -66,6 +71,8 @@ pub struct RosenbrockW {
     /// Generalised forces of a stage, and what they cause.
     response: Response,
     all: Vec<usize>,
+    /// Cut closures, held in every stage; none for a tree.
+    closed: Option<Box<ClosedChain>>,
 }
 
 impl RosenbrockW {
@@ -92,6 +99,7 @@ impl RosenbrockW {
             spring: vec![None; system.bodies.len()],
             response: Response::new(system),
             all: (0..system.bodies.len()).collect(),
+            closed: ClosedChain::new(system),
         }
     }
 
@@ -123,7 +131,8 @@ impl RosenbrockW {
                 Some(block)
             };
         }
-        inertia_inward_with(chart.system, &self.pose, Some(&self.added), &mut self.inertia)
+        inertia_inward_with(chart.system, &self.pose, Some(&self.added), &mut self.inertia)?;
+        self.closed.as_mut().map_or(Ok(()), |c| c.prepare(chart.system, &self.pose, &self.inertia))
     }
 
     /// Turns the rate of y that stands in stage `i` into its `k_i`.
@@ -168,6 +177,9 @@ impl RosenbrockW {
             }
         }
         self.response.solve(system, &self.pose, &self.inertia, &self.all);
+        if let Some(chain) = &mut self.closed {
+            chain.hold(system, &self.pose, &self.inertia, &mut self.response);
+        }
         k[n..n + nv].iter_mut().zip(&self.response.hinge).for_each(|(k, x)| *k += x);
         k[n + nv..2 * n].iter_mut().zip(&self.response.modal).for_each(|(k, x)| *k += x);
         for m in 0..n - nv {

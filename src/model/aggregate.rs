@@ -176,6 +176,29 @@ impl Group {
     }
 }
 
+/// Loops from which on embedding wins: the cost of cut ones grows with the square of their number and more.
+pub const MANY_LOOPS: usize = 3;
+/// Coordinates of a loop beyond which cutting wins: the cost of an embedded one grows with the square of its size and more.
+pub const LARGE_LOOP: usize = 16;
+
+/// Decides on the closures whose method was left to the program: they are embedded if they close [`MANY_LOOPS`] independent loops or more
+/// of up to [`LARGE_LOOP`] coordinates each, or share a loop with an embedded one; else they are cut.
+pub fn choose_methods(system: &mut System) {
+    let given: Vec<_> = system.closures.iter().map(|c| (!c.chosen).then_some(c.method)).collect();
+    for closure in system.closures.iter_mut().filter(|c| c.chosen) {
+        closure.method = ClosureMethod::ConstraintEmbedding;
+    }
+    let (all, _) = aggregates(system);
+    let small = |a: &Aggregate| a.size() <= LARGE_LOOP;
+    let many = all.iter().filter(|a| small(a)).count() >= MANY_LOOPS;
+    for aggregate in &all {
+        let joins = aggregate.closures.iter().any(|&c| given[c] == Some(ClosureMethod::ConstraintEmbedding));
+        if !joins && !(many && small(aggregate)) {
+            aggregate.closures.iter().for_each(|&c| system.closures[c].method = ClosureMethod::TreeAugmented);
+        }
+    }
+}
+
 /// The aggregates of all closures that are embedded, and what the sweeps do at each body; nothing without such closures.
 #[must_use]
 pub fn aggregates(system: &System) -> (Vec<Aggregate>, Vec<Role>) {

@@ -44,13 +44,18 @@ impl Builder<'_> {
     pub(super) fn closure(&self, index: usize, first_row: usize, system: &System) -> Result<Closure, ModelError> {
         let given = &self.definition.closures[index];
         let method = given.method.as_deref().unwrap_or(ClosureMethod::NAMES[0]);
-        let Some(method) = ClosureMethod::from_name(method) else {
+        if !ClosureMethod::is_known(method) {
             return Err(ModelError::BadAxes {
                 place: place("closure", index, "method"),
                 item: given.name.clone(),
                 found: format!("method = \"{method}\" is not a method"),
                 expected: format!("known methods: {}", ClosureMethod::NAMES.join(", ")),
             });
+        }
+        let (chosen, method) = match ClosureMethod::from_name(method) {
+            Some(method) => (false, method),
+            // what is left to the program is decided once all closures are known
+            None => (true, ClosureMethod::default()),
         };
         let joint = if given.kind == "gear" {
             self.gear(index, system)?
@@ -67,7 +72,7 @@ impl Builder<'_> {
             }
             ClosureJoint::Frames { kind, a, b }
         };
-        Ok(Closure { name: given.name.clone(), joint, method, first_row })
+        Ok(Closure { name: given.name.clone(), joint, method, chosen, first_row })
     }
 
     fn closure_side(

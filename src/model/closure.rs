@@ -116,14 +116,16 @@ impl ClosureMethod {
     /// Methods by the name that scenes use; the first is the default.
     pub const NAMES: [&'static str; 3] = ["auto", "tree_augmented", "constraint_embedding"];
 
-    /// The method of that name.
+    /// The method of that name; none for "auto" and for what is no method.
     #[must_use]
     pub fn from_name(name: &str) -> Option<Self> {
-        match name {
-            "auto" | "tree_augmented" => Some(Self::TreeAugmented),
-            "constraint_embedding" => Some(Self::ConstraintEmbedding),
-            _ => None,
-        }
+        [Self::TreeAugmented, Self::ConstraintEmbedding].into_iter().find(|m| m.name() == name)
+    }
+
+    /// True for "auto" and the methods' names.
+    #[must_use]
+    pub fn is_known(name: &str) -> bool {
+        Self::NAMES.contains(&name)
     }
 
     /// The name used in scenes and reports.
@@ -145,6 +147,8 @@ pub struct Closure {
     pub joint: ClosureJoint,
     /// How it is held.
     pub method: ClosureMethod,
+    /// True if that was left to the program.
+    pub chosen: bool,
     /// First multiplier of this closure among those of the system.
     pub first_row: usize,
 }

@@ -202,7 +202,7 @@ pub(super) struct Assembly<'a> {
 
 fn check_overrides(spec: &SceneSpec, overrides: &Overrides) -> Result<(), SceneError> {
     let flexible: Vec<_> = spec.body.iter().filter(|b| b.modal_file.is_some()).map(|b| b.name.as_str()).collect();
-    if let Some(method) = overrides.closure_method.as_deref().filter(|m| ClosureMethod::from_name(m).is_none()) {
+    if let Some(method) = overrides.closure_method.as_deref().filter(|m| !ClosureMethod::is_known(m)) {
         let message = format!("\"{method}\" is not a closure method; known: {}", ClosureMethod::NAMES.join(", "));
         return Err(SceneError::Override { option: "--closure-method", message });
     }

@@ -48,17 +48,7 @@ pub fn method(
     }
     let tolerance = Tolerance { relative: spec.relative_tolerance, absolute: spec.absolute_tolerance };
     let largest_step = spec.largest_step.unwrap_or(f64::INFINITY);
-    let looped = !system.closures.is_empty();
     match name.or(spec.integrator.as_deref()).unwrap_or("auto") {
-        "auto" if looped => {
-            let reason = "dormand_prince: loops are integrated by the explicit methods".to_owned();
-            Ok((Method::DormandPrince { tolerance, largest_step }, Some(reason)))
-        }
-        "rosenbrock_w" if looped => {
-            let message =
-                "rosenbrock_w does not integrate scenes with closures in this version; use auto, dormand_prince or rk4".to_owned();
-            Err(refused(name, message, source))
-        }
         "auto" => {
             let choice = choose(system, tolerance, largest_step, rate_hz);
             Ok((choice.method, Some(choice.reason)))

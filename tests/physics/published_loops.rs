@@ -340,7 +340,7 @@ fn published_flexible_slider_crank_ends_as_in_the_ivp_test_set() {
 }
 
 /// C05: the governor's couplers are struts with a stiff spring and damper between massive bodies; the rods' tops are the closures.
-fn governor() -> Definition {
+pub fn governor() -> Definition {
     let (m, l, side): (f64, f64, f64) = (0.3, 1.0, 0.01);
     let ball = 5.0;
     let center = (0.5 * m * l + ball * l) / (m + ball);

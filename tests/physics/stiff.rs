@@ -1,9 +1,13 @@
 //! The linearly implicit method: its order, and stiff modes that cost neither steps nor time.
 
+use crate::published_loops::governor;
+use crate::support::assert_close;
+use crate::support::loops::{METHODS, held_by, random_loops};
 use crate::support::lumped::lumped_body;
 use crate::support::scenes::{Z, difference, dormand_prince, exact_beam, flexible, hinge, numbers, rigid, run, slopes};
 use crate::support::trees::{Recipe, random_tree};
 use nalgebra::{Matrix3, Vector3};
+use pliant::dynamics::closed_chain::assembly;
 use pliant::dynamics::{Workspace, forward_dynamics};
 use pliant::integrate::chart::Chart;
 use pliant::integrate::choice::choose;
@@ -72,6 +76,62 @@ fn order_is_3_on_every_sort_of_tree() {
             assert!(slopes(&errors).iter().all(|s| (s - 3.0).abs() < 0.2), "recipe {r} seed {seed}: orders {:?}", slopes(&errors));
         }
         assert!(seen >= 3, "recipe {r}: {seen} trees ran");
+    }
+}
+
+/// The same with loops, cut and embedded: x is held on the closures by multipliers, or by independent coordinates.
+#[test]
+fn order_is_3_with_loops_by_either_method() {
+    let all = Recipe { bodies: 7, base: Some("revolute"), ..Recipe::default() };
+    let recipes =
+        [Recipe { flexible: 0.0, ..all }, Recipe { boundary: Some(Boundary::Cantilever), ..all }, Recipe { prescribed: 0.2, ..all }];
+    for (r, recipe) in recipes.iter().enumerate() {
+        let mut seen = 0;
+        for seed in 0..12 {
+            for method in METHODS {
+                let (system, mut start) = held_by(method, random_loops(900 + 20 * r as u64 + seed, recipe, 1)).build().unwrap();
+                start.modal_position.iter_mut().chain(&mut start.modal_velocity).for_each(|x| *x *= 0.3);
+                start.apply_prescribed(&system);
+                let mut workspace = Workspace::new(&system);
+                if assembly::assemble(&system, &mut start).is_err()
+                    || forward_dynamics(&system, &start, &mut workspace).is_err()
+                    || workspace.distance_to_rank_loss() < 0.1
+                {
+                    continue;
+                }
+                let settings =
+                    Settings { duration: 0.04, method: Method::DormandPrince { tolerance: LOOSE, largest_step: 1e-4 }, rate_hz: 1.0 };
+                if simulate(&system, &start, &settings, &mut []).outcome != Outcome::Completed {
+                    continue;
+                }
+                seen += 1;
+                let steps: Vec<_> = (0..4).map(|i| fixed(0.001 * 0.5_f64.powi(i))).collect();
+                let errors = errors(&system, &start, &steps, 5e-5, 0.04);
+                println!("recipe {r} seed {seed} {method}: {errors:?}, orders {:.2?}", slopes(&errors));
+                let last = slopes(&errors)[2];
+                assert!((last - 3.0).abs() < 0.3, "recipe {r} seed {seed} {method}: orders {:?}", slopes(&errors));
+            }
+        }
+        assert!(seen >= 8, "recipe {r}: {seen} loops ran");
+    }
+}
+
+/// C05: a spring and damper of 1e-4 s in a loop hold the explicit pair to fifteen thousand steps.
+#[test]
+fn stiff_governor_takes_few_steps_by_either_method() {
+    for method in METHODS {
+        let (system, start) = held_by(method, governor()).build().unwrap();
+        let mut found = vec![];
+        let slide = system.bodies[system.hinge_index("slide").unwrap()].position;
+        let summary = run(&system, &start, rosenbrock_w(1e-6), 10.0, 2.0, |s| {
+            if [0.5, 1.0, 10.0].iter().any(|t| (s.state.time - t).abs() < 1e-9) {
+                found.push(s.state.position[slide]);
+            }
+        });
+        println!("{method}: s {found:?}, {} steps", summary.steps);
+        // 1e-6 per step over two thousand steps, most of it phase
+        assert_close(&found, &[0.743_249_424_79, 0.501_420_922_38, 0.619_622_917_06], 1e-4, "slider at t = 0.5, 1 and 10 s");
+        assert!(summary.steps < 2_500, "{} steps", summary.steps);
     }
 }
 

@@ -4,15 +4,18 @@
 //! residual forces are added to those of the free pass, so that every hinge load is the sum of both passes (Paper Eq. 42 to 46).
 //! Cost: O(N n_c + n_c^3), N bodies of the loops and n_c blocked directions.
 
-use super::ClosedChain;
+use super::constraint::Motion;
 use super::schur::{NotFactored, REDUNDANT};
+use super::{ClosedChain, along};
 use crate::dynamics::DynamicsError;
 use crate::dynamics::sweep::acceleration_outward::AccelerationScratch;
 use crate::dynamics::sweep::force_inward::{ForceScratch, world_acceleration};
 use crate::dynamics::sweep::inertia_inward::InertiaScratch;
 use crate::dynamics::sweep::pose_outward::PoseScratch;
+use crate::dynamics::sweep::response::Response;
 use crate::dynamics::sweep::velocity_outward::VelocityScratch;
 use crate::model::System;
+use nalgebra::Vector6;
 
 /// Share of the closures' accelerations that may lie where no multiplier reaches before they are said to contradict one another.
 const CONTRADICTION: f64 = 1e-6;
@@ -76,6 +79,39 @@ impl ClosedChain {
         add(&mut force.external_modal, &part.external_modal);
         add(&mut force.applied, &part.applied);
         Ok(())
+    }
+
+    /// Assembles and factors the loop inertia of the cut closures for responses over the factors in `inertia`.
+    ///
+    /// # Errors
+    /// If it holds what is not a number.
+    pub fn prepare(&mut self, system: &System, pose: &PoseScratch, inertia: &InertiaScratch) -> Result<(), DynamicsError> {
+        if self.cut.is_empty() {
+            return Ok(());
+        }
+        self.assemble_loop_inertia(system, pose, inertia);
+        self.factor(system, REDUNDANT)
+    }
+
+    /// Takes the motion along the cut closures' blocked directions out of `response`, whose factors were [prepared](Self::prepare).
+    pub fn hold(&mut self, system: &System, pose: &PoseScratch, inertia: &InertiaScratch, response: &mut Response) {
+        if self.cut.is_empty() {
+            return;
+        }
+        let motion =
+            Motion { body: |k: usize| response.alpha[k], world: Vector6::zeros(), hinge: &response.hinge, modal: Some(&response.modal) };
+        along(system, pose, &motion, &mut self.right);
+        for (x, &row) in self.cut_right.iter_mut().zip(&self.cut) {
+            *x = -self.right[row];
+        }
+        self.schur.solve(&self.cut_right, &mut self.cut_lambda);
+        self.scatter_cut();
+        let lambda = std::mem::take(&mut self.lambda);
+        self.push(system, pose, &lambda);
+        self.lambda = lambda;
+        self.response.solve(system, pose, inertia, &self.all);
+        response.hinge.iter_mut().zip(&self.response.hinge).for_each(|(x, d)| *x += d);
+        response.modal.iter_mut().zip(&self.response.modal).for_each(|(x, d)| *x += d);
     }
 
     /// Factors the loop inertia.
