@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Writes the measured tables of README.md between their markers: validation and cost. Needs target/release/pliant."""
+"""Writes the measured tables of README.md between their markers: validation, cost, loops. Needs target/release/pliant."""
 import argparse
 import json
 import math
@@ -77,17 +77,33 @@ def validation_table():
     return "\n".join("| " + " | ".join(row) + " |" for row in rows)
 
 
+def physics_test(name):
+    """What one test of the physics prints."""
+    command = ["cargo", "test", "--release", "--locked", "--test", "physics", name, "--", "--nocapture"]
+    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+
+
 def cost_table():
     """Cost per body as the scaling test prints it."""
-    command = ["cargo", "test", "--release", "--locked", "--test", "physics", "cost_of_an_evaluation", "--", "--nocapture"]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    done = physics_test("cost_of_an_evaluation")
     found = re.search(r"(\d+) ns per body of 1e3, (\d+) ns per body of 1e4", done.stdout)
     if not found:
         sys.exit(f"the scaling test printed no figures: {done.stdout}{done.stderr}")
     return f"| chain of rigid links | ns per body and evaluation |\n| --- | --- |\n| 1,000 | {found[1]} |\n| 10,000 | {found[2]} |"
 
 
-TABLES = {"validation": validation_table, "cost": cost_table}
+def loops_table():
+    """Cost of cut and embedded loops as their test prints it."""
+    done = physics_test("embedding_costs")
+    rows = re.findall(r"loop cost: (.*): ([\d.]+) us cut, ([\d.]+) us embedded", done.stdout)
+    if not rows:
+        sys.exit(f"the test of loop costs printed no figures: {done.stdout}{done.stderr}")
+    lines = [f"| {what} | {float(cut):.0f} | {float(embedded):.0f} | {float(embedded) / float(cut):.2f} |" for what, cut, embedded in rows]
+    head = ["| loops | tree_augmented (us per step) | constraint_embedding | ratio |", "| --- | --- | --- | --- |"]
+    return "\n".join(head + lines)
+
+
+TABLES = {"validation": validation_table, "cost": cost_table, "loops": loops_table}
 
 
 def main():

@@ -225,11 +225,18 @@ fn synchronised_panels_share_the_moment_of_the_force_at_their_end_by_statics() {
 }
 
 #[test]
-fn the_scene_of_the_readme_is_accepted_and_runs() {
+fn scenes_of_the_readme_are_accepted_and_run() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let readme = std::fs::read_to_string(root.join("README.md")).unwrap();
-    let text = readme.split("```toml\n").nth(1).and_then(|t| t.split("```").next()).unwrap().to_owned();
-    let scene = assemble::assemble(Source { path: root.join("README.toml"), text }, &Overrides::default()).unwrap();
-    let record = run(&scene);
-    assert!(record.position.iter().all(|x| x.is_finite()));
+    let block = |i: usize| readme.split("```toml\n").nth(i).and_then(|t| t.split("```").next()).unwrap().to_owned();
+    // alone, and with the rod that closes a loop; the gear is one of the synchronised panels
+    for text in [block(1), format!("{}\n{}", block(1), block(2))] {
+        let scene = assemble::assemble(Source { path: root.join("README.toml"), text }, &Overrides::default()).unwrap();
+        let record = run(&scene);
+        assert!(record.position.iter().all(|x| x.is_finite()));
+    }
+    let panels = std::fs::read_to_string(root.join("examples/10_synchronised_panels/scene.toml")).unwrap();
+    for line in ["hinge_a = \"drive\"", "hinge_b = \"panel_1_line\"", "ratio = -2.0"] {
+        assert!(block(3).contains(line) && panels.contains(line), "{line}");
+    }
 }

@@ -193,7 +193,7 @@ pub fn choose_methods(system: &mut System) {
     let many = all.iter().filter(|a| small(a)).count() >= MANY_LOOPS;
     for aggregate in &all {
         let joins = aggregate.closures.iter().any(|&c| given[c] == Some(ClosureMethod::ConstraintEmbedding));
-        if !joins && !(many && small(aggregate)) {
+        if !(joins || many && small(aggregate)) {
             aggregate.closures.iter().for_each(|&c| system.closures[c].method = ClosureMethod::TreeAugmented);
         }
     }
