@@ -12,9 +12,17 @@ use pliant::scene::{Overrides, Scene, assemble};
 use std::path::Path;
 
 fn example(name: &str) -> Scene {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples").join(name);
-    assemble::load(&path, &Overrides::default()).unwrap()
+    example_by("auto", name)
 }
+
+/// The example with its closures held by `method`.
+fn example_by(method: &str, name: &str) -> Scene {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples").join(name);
+    assemble::load(&path, &Overrides { closure_method: Some(method.to_owned()), ..Overrides::default() }).unwrap()
+}
+
+/// Both methods for closures.
+const METHODS: [&str; 2] = ["tree_augmented", "constraint_embedding"];
 
 /// Last sample and the largest loads, by body index.
 #[derive(Default)]
@@ -129,99 +137,109 @@ fn free_free_and_cantilever_modes_give_the_same_root_loads() {
 
 #[test]
 fn four_bar_starts_with_the_accelerations_of_the_closed_solution_and_stays_closed() {
-    let scene = example("06_four_bar/scene.toml");
-    let evaluation = Evaluation::of(&scene.system, &scene.state).unwrap();
-    // angular accelerations of crank, coupler and rocker, solved with 30 digits (reference problem C09)
-    let rate = |name: &str| evaluation.hinges.get(name).unwrap().acceleration[0];
-    let found = [rate("crank_foot"), rate("crank_foot") + rate("crank_pin"), rate("rocker_foot")];
-    for (f, e) in found.iter().zip([-9.856_158_991_543_052, 2.990_203_058_289_293, 0.062_798_651_029_610_68]) {
-        assert!((f - e).abs() < 1e-11, "{found:?}");
+    for method in METHODS {
+        let scene = example_by(method, "06_four_bar/scene.toml");
+        let evaluation = Evaluation::of(&scene.system, &scene.state).unwrap();
+        // angular accelerations of crank, coupler and rocker, solved with 30 digits (reference problem C09)
+        let rate = |name: &str| evaluation.hinges.get(name).unwrap().acceleration[0];
+        let found = [rate("crank_foot"), rate("crank_foot") + rate("crank_pin"), rate("rocker_foot")];
+        for (f, e) in found.iter().zip([-9.856_158_991_543_052, 2.990_203_058_289_293, 0.062_798_651_029_610_68]) {
+            assert!((f - e).abs() < 1e-11, "{found:?}");
+        }
+        let end = run(&scene);
+        assert!(end.position.iter().all(|x| x.is_finite()));
     }
-    let end = run(&scene);
-    assert!(end.position.iter().all(|x| x.is_finite()));
 }
 
 #[test]
 fn bricard_linkage_falls_to_where_the_independent_program_has_it() {
-    let scene = example("07_bricard/scene.toml");
-    let record = run(&scene);
-    // P3 is the origin of rod_3; reference problem C04, whose energy holds to 1e-10
-    let found = record.frames[scene.system.body_index("rod_3").unwrap()].position;
-    for (f, e) in found.iter().zip([0.510_501_46, -1.649_167_60, 0.140_123_11]) {
-        assert!((f - e).abs() < 1e-6, "{found:?}");
+    for method in METHODS {
+        let scene = example_by(method, "07_bricard/scene.toml");
+        let record = run(&scene);
+        // P3 is the origin of rod_3; reference problem C04, whose energy holds to 1e-10
+        let found = record.frames[scene.system.body_index("rod_3").unwrap()].position;
+        for (f, e) in found.iter().zip([0.510_501_46, -1.649_167_60, 0.140_123_11]) {
+            assert!((f - e).abs() < 1e-6, "{found:?}");
+        }
     }
 }
 
 #[test]
 fn squeezing_mechanism_ends_at_the_angles_of_the_ivp_test_set() {
-    let scene = example("08_squeezing_mechanism/scene.toml");
-    let record = run(&scene);
-    let at = |name: &str| record.position[scene.system.bodies[scene.system.hinge_index(name).unwrap()].position];
-    let gamma = at("spring_foot") + at("spring_head");
-    let found = [at("beta"), at("Theta"), gamma, at("Phi"), at("delta"), at("Omega"), at("epsilon")];
-    // reference problem C02, 14 digits of which agree between two runs of a program of higher precision
-    let expected = [
-        15.810_771_195_153_707,
-        -15.756_371_058_411_839,
-        0.040_822_240_119_645_8,
-        -0.534_730_116_342_079_6,
-        0.524_409_965_879_954_1,
-        0.534_730_116_342_079_6,
-        1.048_080_741_041_938,
-    ];
-    for (f, e) in found.iter().zip(expected) {
-        // eight digits of each are the test set's measure of a good run; local errors of 1e-10 leave more
-        assert!((f / e - 1.0).abs() < 1e-8, "{found:?}");
+    for method in METHODS {
+        let scene = example_by(method, "08_squeezing_mechanism/scene.toml");
+        let record = run(&scene);
+        let at = |name: &str| record.position[scene.system.bodies[scene.system.hinge_index(name).unwrap()].position];
+        let gamma = at("spring_foot") + at("spring_head");
+        let found = [at("beta"), at("Theta"), gamma, at("Phi"), at("delta"), at("Omega"), at("epsilon")];
+        // reference problem C02, 14 digits of which agree between two runs of a program of higher precision
+        let expected = [
+            15.810_771_195_153_707,
+            -15.756_371_058_411_839,
+            0.040_822_240_119_645_8,
+            -0.534_730_116_342_079_6,
+            0.524_409_965_879_954_1,
+            0.534_730_116_342_079_6,
+            1.048_080_741_041_938,
+        ];
+        for (f, e) in found.iter().zip(expected) {
+            // eight digits of each are the test set's measure of a good run; local errors of 1e-10 leave more
+            assert!((f / e - 1.0).abs() < 1e-8, "{found:?}");
+        }
     }
 }
 
 #[test]
 fn flexible_slider_crank_turns_the_pull_of_its_slider_into_torque_by_statics() {
-    let scene = example("09_slider_crank_flexible/scene.toml");
-    let record = run(&scene);
-    let (crank, pin) = (scene.system.hinge_index("crank").unwrap(), scene.system.hinge_index("crank_pin").unwrap());
-    let (pull, radius, length): (f64, f64, f64) = (5000.0, 1.0, 3.0);
-    // the crank stands upright and moves the slider by its own length per radian, whatever the rod's length: torque is force times radius
-    let torque = record.loads[crank][1];
-    println!("torque {torque}");
-    // the quarter turn takes fifty periods of the rod held by two pins (10 Hz): what it leaves vibrating is below 1e-4
-    assert!((-torque / (pull * radius) - 1.0).abs() < 1e-4, "{torque}");
-    let slope = (radius / length).asin();
-    let along = record.loads[pin].fixed_rows::<3>(3).norm();
-    assert!((along / (pull / slope.cos()) - 1.0).abs() < 1e-4, "{along}");
-    // the rod stretches by N L / E A of the boom, 70 GPa, 60 x 40 mm; the clamped root's restraint of contraction takes 0.1 %
-    let stretch = pull / slope.cos() * length / (70e9 * 0.06 * 0.04);
-    let rigid = (length * length - radius * radius).sqrt();
-    let slider = record.frames[scene.system.body_index("slider").unwrap()].position.x;
-    let expected = stretch / slope.cos();
-    println!("slider {} beyond the rigid one, expected {expected}", slider - rigid);
-    assert!(((slider - rigid) / expected - 1.0).abs() < 5e-3, "{} {expected}", slider - rigid);
+    for method in METHODS {
+        let scene = example_by(method, "09_slider_crank_flexible/scene.toml");
+        let record = run(&scene);
+        let (crank, pin) = (scene.system.hinge_index("crank").unwrap(), scene.system.hinge_index("crank_pin").unwrap());
+        let (pull, radius, length): (f64, f64, f64) = (5000.0, 1.0, 3.0);
+        // the crank stands upright and moves the slider by its own length per radian, whatever the rod's length: torque is force times radius
+        let torque = record.loads[crank][1];
+        println!("torque {torque}");
+        // the quarter turn takes fifty periods of the rod held by two pins (10 Hz): what it leaves vibrating is below 1e-4
+        assert!((-torque / (pull * radius) - 1.0).abs() < 1e-4, "{torque}");
+        let slope = (radius / length).asin();
+        let along = record.loads[pin].fixed_rows::<3>(3).norm();
+        assert!((along / (pull / slope.cos()) - 1.0).abs() < 1e-4, "{along}");
+        // the rod stretches by N L / E A of the boom, 70 GPa, 60 x 40 mm; the clamped root's restraint of contraction takes 0.1 %
+        let stretch = pull / slope.cos() * length / (70e9 * 0.06 * 0.04);
+        let rigid = (length * length - radius * radius).sqrt();
+        let slider = record.frames[scene.system.body_index("slider").unwrap()].position.x;
+        let expected = stretch / slope.cos();
+        println!("slider {} beyond the rigid one, expected {expected}", slider - rigid);
+        assert!(((slider - rigid) / expected - 1.0).abs() < 5e-3, "{} {expected}", slider - rigid);
+    }
 }
 
 #[test]
 fn synchronised_panels_share_the_moment_of_the_force_at_their_end_by_statics() {
-    let scene = example("10_synchronised_panels/scene.toml");
-    let record = run(&scene);
-    let load = |name: &str| record.loads[scene.system.hinge_index(name).unwrap()];
-    // 1 N at the end of 1 m of yoke and 2 m each of panels; the rod's line passes 0.12 m above the hinge lines
-    let (force, yoke, panel, lever) = (1.0, 1.0, 2.0, 0.12);
-    let rod = force * panel / lever;
-    let expected = [
-        (load("drive")[1], force * (yoke + 2.0 * panel), "drive"),
-        (load("rod_foot")[3], rod, "rod"),
-        // what the cable adds to the hinge of the first panel: the rod has taken its part
-        (load("panel_1_line")[1], force * 2.0 * panel - rod * lever, "cable"),
-        (load("panel_1_line")[3], -rod, "hinge line of the first panel"),
-    ];
-    for (found, expected, what) in expected {
-        println!("{what}: {found} of {expected}");
-        // the wing (some 4 s per period) still swings by the cube of period over rise, and is bent by 1e-3 rad
-        assert!((found / expected - 1.0).abs() < 3e-3, "{what}: {found}, expected {expected}");
+    for method in METHODS {
+        let scene = example_by(method, "10_synchronised_panels/scene.toml");
+        let record = run(&scene);
+        let load = |name: &str| record.loads[scene.system.hinge_index(name).unwrap()];
+        // 1 N at the end of 1 m of yoke and 2 m each of panels; the rod's line passes 0.12 m above the hinge lines
+        let (force, yoke, panel, lever) = (1.0, 1.0, 2.0, 0.12);
+        let rod = force * panel / lever;
+        let expected = [
+            (load("drive")[1], force * (yoke + 2.0 * panel), "drive"),
+            (load("rod_foot")[3], rod, "rod"),
+            // what the cable adds to the hinge of the first panel: the rod has taken its part
+            (load("panel_1_line")[1], force * 2.0 * panel - rod * lever, "cable"),
+            (load("panel_1_line")[3], -rod, "hinge line of the first panel"),
+        ];
+        for (found, expected, what) in expected {
+            println!("{what}: {found} of {expected}");
+            // the wing (some 4 s per period) still swings by the cube of period over rise, and is bent by 1e-3 rad
+            assert!((found / expected - 1.0).abs() < 3e-3, "{what}: {found}, expected {expected}");
+        }
+        // the parallelogram keeps the second panel parallel to the yoke, but for what bending shortens the first panel's chord
+        let turned = record.frames[scene.system.body_index("panel_2").unwrap()].rotation.column(0).z;
+        println!("panel_2 turned by {turned}");
+        assert!(turned.abs() < 1e-4, "{turned}");
     }
-    // the parallelogram keeps the second panel parallel to the yoke, but for what bending shortens the first panel's chord
-    let turned = record.frames[scene.system.body_index("panel_2").unwrap()].rotation.column(0).z;
-    println!("panel_2 turned by {turned}");
-    assert!(turned.abs() < 1e-4, "{turned}");
 }
 
 #[test]
