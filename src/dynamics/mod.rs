@@ -13,7 +13,8 @@
 //! 4. [`sweep::force_inward`]: residual forces `z`, innovations, Eq. 34 and 35;
 //! 5. [`sweep::acceleration_outward`]: accelerations, Eq. 36 to 41;
 //!
-//! closures are then held by a correction pass ([`closed_chain`]);
+//! loops whose closures are embedded take part in these as aggregate bodies ([`aggregate`], Eq. 47 to 69); cut closures are held by a
+//! correction pass ([`closed_chain`], Eq. 42 to 46);
 //!
 //! and, only where something asks, [`hinge_load`]: `f(k') = P+ alpha+ + z+`, Eq. 18 and 38.
 //!
@@ -246,7 +247,7 @@ pub fn forward_dynamics(system: &System, state: &State, workspace: &mut Workspac
     sweep::acceleration_outward::acceleration_outward(system, pose, velocity, inertia, force, acceleration);
     if let Some(chain) = closed {
         chain.close(system, pose, velocity, inertia, force, acceleration)?;
-        chain.recover_embedded(system, state, pose, velocity, inertia, acceleration, force);
+        chain.recover_embedded(&aggregate::load::Swept { system, state, pose, velocity, inertia, acceleration }, force);
     }
     Ok(())
 }

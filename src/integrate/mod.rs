@@ -5,6 +5,7 @@
 //! step's start, so that quaternions stay of unit length and each method keeps its order. [`runge_kutta`] holds the explicit methods,
 //! [`rosenbrock_w`] the linearly implicit one that stiff modes do not slow; [`choice`] decides between them.
 
+pub mod change_point;
 pub mod chart;
 pub mod choice;
 pub mod observer;

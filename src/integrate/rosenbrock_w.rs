@@ -18,7 +18,7 @@
 //!
 //! The matrix is that of the inertia sweep with `Lambda = 1 + h g c + (h g)^2 k` and the like on hinges; it is swept once per step, at
 //! the step's start, since W-methods have their order only if all stages share one `A`. A stage costs one plain evaluation
-//! and two sweeps ([`response`]). K of a full modal stiffness is its diagonal. Prescribed hinges have no rows, and df/dt no term.
+//! and two sweeps ([`Response`]). K of a full modal stiffness is its diagonal. Prescribed hinges have no rows, and df/dt no term.
 //!
 //! Closures: x must not open them, so that `G x = 0` with G at the step's start. Embedded ones see to that themselves, since the sweeps
 //! solve for independent coordinates; cut ones by multipliers on the same factored matrix. The Jacobian is then that of the closed system

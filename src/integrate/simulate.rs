@@ -1,5 +1,6 @@
 //! The time loop: steps, breaks, output times, and an orderly end whatever happens.
 
+use super::change_point::{self, Passage};
 use super::chart::Chart;
 use super::observer::{Flow, Observer, Sample};
 use super::rosenbrock_w::RosenbrockW;
@@ -10,7 +11,6 @@ use super::tableau::Tableau;
 use super::w_tableau::ROS34PW2;
 use super::{Stepper, tableau};
 use crate::dynamics::closed_chain::drift;
-use crate::dynamics::closed_chain::schur::REDUNDANT;
 use crate::dynamics::{DynamicsError, Workspace, forward_dynamics};
 use crate::model::{State, System};
 use thiserror::Error;
@@ -298,7 +298,7 @@ impl Run<'_, '_> {
     /// Takes back what the last step drifted off the closures.
     fn hold_closures(&mut self, stepper: &mut dyn Stepper) -> Result<(), RunFailure> {
         let time = self.chart.base.time;
-        let near = self.chart.nearest_rank_loss < CHANGE_POINT;
+        let near = change_point::is_near(self.chart.nearest_rank_loss);
         let wrap = |source| {
             if near { RunFailure::ChangePoint { time, source: Some(source) } } else { RunFailure::Dynamics { time, source } }
         };
@@ -312,8 +312,7 @@ impl Run<'_, '_> {
 
     /// Finds a step towards `stop` that meets the tolerance; returns its length.
     fn advance(&mut self, stepper: &mut dyn Stepper, stop: f64) -> Result<f64, RunFailure> {
-        // near a change point of the loops rounding grows without bound, and smaller steps only come closer to it: they are leapt over
-        let (mut nearest, mut tries, mut leaps) = (f64::INFINITY, 0, LEAPS.iter());
+        let mut passage = Passage::default();
         loop {
             let time = self.chart.base.time;
             let left = (stop - time) - self.chart.clock_rest;
@@ -328,7 +327,7 @@ impl Run<'_, '_> {
             let floor = 16.0 * f64::EPSILON * time.abs().max(stop.abs());
             if step < floor && step < left {
                 let place = fastest_place(self.chart);
-                if nearest < CHANGE_POINT && self.chart.base.is_finite() {
+                if passage.is_near() && self.chart.base.is_finite() {
                     return Err(RunFailure::ChangePoint { time, source: None });
                 }
                 return Err(if self.sampled.is_finite() && self.sampled.time > time {
@@ -358,11 +357,7 @@ impl Run<'_, '_> {
                 }
                 return Ok(step);
             };
-            let here = self.chart.nearest_rank_loss;
-            nearest = nearest.min(here);
-            // near a change point the estimate cannot be smaller than what the loop inertia's rounding makes of accelerations
-            let rounding = REDUNDANT / (here * here * self.relative);
-            let allowed = if here < CHANGE_POINT { rounding.clamp(1.0, LARGEST_ROUNDING) } else { 1.0 };
+            let allowed = passage.allowed_error(self.chart.nearest_rank_loss, self.relative);
             match attempted {
                 Ok(Some(error)) if error <= allowed => {
                     self.local_error = self.local_error.max(error * self.relative);
@@ -381,7 +376,7 @@ impl Run<'_, '_> {
                     self.rejected += 1;
                     self.step = 0.1 * step;
                     if self.step < floor {
-                        return Err(if nearest < CHANGE_POINT {
+                        return Err(if passage.is_near() {
                             RunFailure::ChangePoint { time, source: Some(source) }
                         } else {
                             RunFailure::Dynamics { time, source }
@@ -389,11 +384,7 @@ impl Run<'_, '_> {
                     }
                 }
             }
-            tries += 1;
-            if tries >= LEAP_AFTER
-                && nearest < CHANGE_POINT
-                && let Some(share) = leaps.next()
-            {
+            if let Some(share) = passage.leap() {
                 self.step = (self.accepted * share).min(self.largest);
             }
         }
@@ -446,15 +437,6 @@ impl Run<'_, '_> {
 
 /// Violation (m or rad) that no projection should leave: the motion of such a system is not the system's.
 const OPEN: f64 = 1e-6;
-
-/// Relative singular value of the loops below which a step that fails does so at a change point.
-const CHANGE_POINT: f64 = 1e-2;
-/// Rejected tries of one step after which a change point is leapt over.
-const LEAP_AFTER: usize = 3;
-/// Shares of the last accepted step that a leap takes, in turn: some stage of one may fall on the change point itself.
-const LEAPS: [f64; 6] = [1.0, 0.6, 1.5, 0.8, 0.4, 2.0];
-/// Most that rounding may make of the error estimate at a change point, in units of the tolerance; the report's local error shows it.
-const LARGEST_ROUNDING: f64 = 1e3;
 
 /// The closure that is furthest open at the poses in `workspace`.
 fn opened(system: &System, workspace: &Workspace, time: f64) -> RunFailure {

@@ -1,6 +1,6 @@
 //! Accelerations of an aggregate's members from that of its root (Paper Eq. 66 and 67).
 
-use super::embedding::spread_outward;
+use super::spread::spread_outward;
 use crate::dynamics::sweep::inertia_inward::InertiaScratch;
 use crate::dynamics::sweep::pose_outward::PoseScratch;
 use crate::dynamics::sweep::velocity_outward::VelocityScratch;

@@ -6,12 +6,10 @@
 #![expect(non_snake_case, reason = "symbols follow the table in dynamics/aggregate/mod.rs")]
 
 use super::projection::{MemberForces, project_inward};
-use crate::dynamics::closed_chain::constraint::{ClosureAt, Motion};
+use crate::dynamics::closed_chain::constraint::ClosureAt;
 use crate::dynamics::sweep::pose_outward::PoseScratch;
-use crate::dynamics::sweep::velocity_outward::VelocityScratch;
 use crate::model::closure::MAX_ROWS;
 use crate::model::{Aggregate, ClosureJoint, System};
-use crate::spatial::shift::{motion_to, rotate, rotate_back};
 use nalgebra::Vector6;
 
 /// Scaled columns below this are redundant: closures that are assembled to 1e-10 leave no more.
@@ -391,112 +389,5 @@ impl Embedding {
         for (q, (&j, o)) in self.independent.iter().zip(out).enumerate() {
             *o = force[j] + self.dependent.iter().zip(self.X_column(q)).map(|(&d, x)| x * force[d]).sum::<f64>();
         }
-    }
-}
-
-/// What the rates of one aggregate make of its accelerations.
-#[derive(Debug, Clone)]
-pub struct EmbeddedBias {
-    /// Accelerations of the members' frames with the root and all coordinates at rest but prescribed ones.
-    pub alpha: Vec<Vector6<f64>>,
-    /// `X_dot u_R`: accelerations of the dependent coordinates that close the loop then; zero for the others.
-    pub particular: Vec<f64>,
-    /// Part of the closures' accelerations that no coordinate reaches, and their size.
-    pub missed: [f64; 2],
-    alpha_plus: Vec<Vector6<f64>>,
-    violation: Vec<f64>,
-    step: Vec<f64>,
-}
-
-impl EmbeddedBias {
-    /// Room for `aggregate`.
-    #[must_use]
-    pub fn new(aggregate: &Aggregate) -> Self {
-        let zeros = vec![Vector6::zeros(); aggregate.members.len()];
-        Self {
-            alpha: zeros.clone(),
-            particular: vec![0.0; aggregate.size()],
-            missed: [0.0; 2],
-            alpha_plus: zeros,
-            violation: vec![0.0; aggregate.row_count],
-            step: vec![0.0; aggregate.row_count.min(aggregate.size())],
-        }
-    }
-
-    /// Takes in the rates; `velocity` holds those of all bodies, the closures' own biases, and prescribed accelerations.
-    pub fn follow_rates(&mut self, system: &System, pose: &PoseScratch, velocity: &VelocityScratch, index: usize) {
-        let (aggregate, embedding) = (&system.aggregates[index], &pose.embeddings[index]);
-        self.particular.fill(0.0);
-        let Self { alpha, particular, alpha_plus, violation, step, missed } = self;
-        spread_outward(system, pose, Some(velocity), aggregate, &Vector6::zeros(), particular, alpha_plus, alpha);
-        let motion = Motion {
-            body: |k: usize| aggregate.member_of(k).map_or_else(Vector6::zeros, |m| alpha[m]),
-            world: Vector6::zeros(),
-            hinge: &velocity.prescribed,
-            modal: None,
-        };
-        let (mut row, mut size) = (0, 0.0_f64);
-        for &index in &aggregate.closures {
-            let closure = &system.closures[index];
-            let own = &mut violation[row..row + closure.row_count()];
-            pose.closures[index].along(closure, system, &motion, own);
-            for (v, b) in own.iter_mut().zip(&velocity.closure_bias[closure.rows()]) {
-                size = size.max(v.abs()).max(b.abs());
-                *v += b;
-            }
-            row += closure.row_count();
-        }
-        *missed = [embedding.dependent_step(violation, step), size];
-        for (&d, s) in embedding.dependent.iter().zip(step.iter()) {
-            particular[d] = *s;
-        }
-    }
-}
-
-/// Accelerations of the members' frames: `alpha+` at O in O axes and `alpha` of the recursion's frames, from the acceleration `base` of the
-/// root's frame and `u_dot` of the coordinates; with the biases in `velocity`, or without any.
-#[expect(clippy::too_many_arguments, reason = "a sweep step reads every earlier sweep")]
-pub fn spread_outward(
-    system: &System,
-    pose: &PoseScratch,
-    velocity: Option<&VelocityScratch>,
-    aggregate: &Aggregate,
-    base: &Vector6<f64>,
-    u_dot: &[f64],
-    alpha_plus: &mut [Vector6<f64>],
-    alpha: &mut [Vector6<f64>],
-) {
-    for (m, member) in aggregate.members.iter().enumerate() {
-        let (k, own) = (member.body, &pose.bodies[member.body]);
-        let mut at_hinge = *base;
-        if !(aggregate.holds_root_modes && m == 0) {
-            let outer = match member.parent {
-                None => motion_to(&own.l, base),
-                Some(p) => {
-                    let eta_ddot = &u_dot[aggregate.members[p].modes.clone()];
-                    motion_to(&own.l, &alpha[p]) + pose.shape_of(system, k).iter().zip(eta_ddot).map(|(s, e)| s * *e).sum::<Vector6<f64>>()
-                }
-            };
-            at_hinge = rotate_back(&own.rotation, &outer);
-            alpha_plus[m] = at_hinge;
-            at_hinge += velocity.map_or_else(Vector6::zeros, |v| v.bodies[k].a);
-            for (i, j) in member.rates.clone().enumerate().filter(|(_, j)| aggregate.free[*j]) {
-                at_hinge += own.hinge.map[i] * u_dot[j];
-            }
-        }
-        alpha[m] = match own.flexible {
-            None => at_hinge,
-            Some(index) => {
-                let part = &pose.flexible[index];
-                let x = -part.inboard.position;
-                let mut at_frame = motion_to(&x, &rotate(&part.inboard.rotation, &at_hinge));
-                for (s, e) in part.shape_inboard.iter().zip(&u_dot[member.modes.clone()]) {
-                    at_frame -= s * *e;
-                }
-                let bias = velocity.map_or_else(Vector6::zeros, |v| v.bodies[k].a_inboard);
-                // a moved root's bias is that of O seen from B
-                at_frame + if part.shape_inboard.is_empty() { bias } else { -motion_to(&x, &bias) }
-            }
-        };
     }
 }

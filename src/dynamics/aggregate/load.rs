@@ -15,6 +15,23 @@ use crate::model::{Aggregate, BodyKind, HingeKind, State, System};
 use crate::spatial::shift::{force_from, rotate};
 use nalgebra::Vector6;
 
+/// The sweeps of one evaluation that loads are recovered from.
+#[derive(Debug, Clone, Copy)]
+pub struct Swept<'a> {
+    /// The system.
+    pub system: &'a System,
+    /// State of the evaluation.
+    pub state: &'a State,
+    /// Poses.
+    pub pose: &'a PoseScratch,
+    /// Velocities and biases.
+    pub velocity: &'a VelocityScratch,
+    /// Articulated inertias.
+    pub inertia: &'a InertiaScratch,
+    /// All accelerations, those of correction passes added.
+    pub acceleration: &'a AccelerationScratch,
+}
+
 /// Room for the loads of one aggregate.
 #[derive(Debug, Clone)]
 pub struct AggregateLoad {
@@ -50,22 +67,11 @@ impl AggregateLoad {
 
     /// Finds the multipliers of the aggregate's closures (written to `lambda`, all closures' multipliers) and the loads at its hinges, which
     /// become `z+` with no `P+`; adds the closures' forces to the external ones. All accelerations and the loads outside are known.
-    #[expect(clippy::too_many_arguments, reason = "a sweep step reads every earlier sweep")]
-    pub fn recover(
-        &mut self,
-        system: &System,
-        state: &State,
-        pose: &PoseScratch,
-        velocity: &VelocityScratch,
-        inertia: &InertiaScratch,
-        acceleration: &AccelerationScratch,
-        index: usize,
-        force: &mut ForceScratch,
-        lambda: &mut [f64],
-    ) {
+    pub fn recover(&mut self, swept: &Swept<'_>, index: usize, force: &mut ForceScratch, lambda: &mut [f64]) {
+        let Swept { system, pose, .. } = *swept;
         let (aggregate, embedding) = (&system.aggregates[index], &pose.embeddings[index]);
         for m in 0..aggregate.members.len() {
-            self.inertial_force(system, state, pose, velocity, inertia, acceleration, aggregate, m, force);
+            self.inertial_force(swept, aggregate, m, force);
         }
         project_inward(system, pose, aggregate, &mut self.wrench, &mut self.generalised);
 
@@ -97,19 +103,8 @@ impl AggregateLoad {
     }
 
     /// Inertial force of member m with the loads of what hangs on it outside, and the same on its coordinates, less what acts on them.
-    #[expect(clippy::too_many_arguments, reason = "a sweep step reads every earlier sweep")]
-    fn inertial_force(
-        &mut self,
-        system: &System,
-        state: &State,
-        pose: &PoseScratch,
-        velocity: &VelocityScratch,
-        inertia: &InertiaScratch,
-        acceleration: &AccelerationScratch,
-        aggregate: &Aggregate,
-        m: usize,
-        force: &ForceScratch,
-    ) {
+    fn inertial_force(&mut self, swept: &Swept<'_>, aggregate: &Aggregate, m: usize, force: &ForceScratch) {
+        let Swept { system, state, pose, velocity, inertia, acceleration } = *swept;
         let member = &aggregate.members[m];
         let (k, body) = (member.body, &system.bodies[member.body]);
         let alpha = &acceleration.alpha[k];

@@ -2,8 +2,8 @@
 //!
 //! An aggregate takes part in the sweeps of [`super::sweep`] like any other body, at its first member:
 //!
-//! 1. [`embedding`]: which coordinates are independent, and `X` (pose sweep, Eq. 53); [`embedding::Embedding::particular`]: `X_dot` times
-//!    the rates (velocity sweep, Eq. 58);
+//! 1. [`embedding`]: which coordinates are independent, and `X` (pose sweep, Eq. 53); [`bias`]: `X_dot` times the rates (velocity sweep,
+//!    Eq. 58);
 //! 2. [`inertia`]: `D_E`, and the articulated inertia that the root feels (inertia sweep, Eq. 62 and 63);
 //! 3. [`force`]: residual forces and innovations (force sweep, Eq. 64 and 65);
 //! 4. [`acceleration`]: accelerations of all members (acceleration sweep, Eq. 66 and 67);
@@ -26,11 +26,13 @@
 //! taking the multipliers' forces off it.
 
 pub mod acceleration;
+pub mod bias;
 pub mod closing;
 pub mod embedding;
 pub mod force;
 pub mod inertia;
 pub mod load;
 pub mod projection;
+pub mod spread;
 
 pub use embedding::Embedding;

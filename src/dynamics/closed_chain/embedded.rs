@@ -2,9 +2,8 @@
 
 use super::ClosedChain;
 use crate::dynamics::DynamicsError;
-use crate::dynamics::sweep::acceleration_outward::AccelerationScratch;
+use crate::dynamics::aggregate::load::Swept;
 use crate::dynamics::sweep::force_inward::ForceScratch;
-use crate::dynamics::sweep::inertia_inward::InertiaScratch;
 use crate::dynamics::sweep::pose_outward::PoseScratch;
 use crate::dynamics::sweep::velocity_outward::VelocityScratch;
 use crate::model::{State, System};
@@ -47,19 +46,9 @@ impl ClosedChain {
     }
 
     /// Multipliers of embedded closures and the loads inside aggregates, inner aggregates first.
-    #[expect(clippy::too_many_arguments, reason = "a sweep step reads every earlier sweep")]
-    pub fn recover_embedded(
-        &mut self,
-        system: &System,
-        state: &State,
-        pose: &PoseScratch,
-        velocity: &VelocityScratch,
-        inertia: &InertiaScratch,
-        acceleration: &AccelerationScratch,
-        force: &mut ForceScratch,
-    ) {
+    pub fn recover_embedded(&mut self, swept: &Swept<'_>, force: &mut ForceScratch) {
         for &index in &self.inner_first {
-            self.loads[index].recover(system, state, pose, velocity, inertia, acceleration, index, force, &mut self.lambda);
+            self.loads[index].recover(swept, index, force, &mut self.lambda);
         }
     }
 }

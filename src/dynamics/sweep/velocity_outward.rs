@@ -5,7 +5,7 @@
 #![expect(non_snake_case, reason = "symbols follow the table in dynamics/mod.rs")]
 
 use super::pose_outward::PoseScratch;
-use crate::dynamics::aggregate::embedding::EmbeddedBias;
+use crate::dynamics::aggregate::bias::EmbeddedBias;
 use crate::model::hinge::MAX_RATES;
 use crate::model::{BodyKind, State, System};
 use crate::spatial::shift::{angular, linear, motion_to, rotate, rotate_back, spatial};
