@@ -247,7 +247,7 @@ fn published_gear_pair_shares_the_torque() {
 }
 
 /// N four-bars side by side: rockers on the ground, couplers on the rockers, closures where a coupler meets the next rocker.
-fn row_of_four_bars(count: usize, method: &str) -> (System, State) {
+pub fn row_of_four_bars(count: usize, method: &str) -> (System, State) {
     let (mut bodies, mut hinges, mut closures) = (Vec::new(), Vec::new(), Vec::new());
     let end = [1.0, 0.0, 0.0];
     for i in 0..=count {

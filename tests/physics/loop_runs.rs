@@ -1,7 +1,8 @@
 //! Loops over long times: closed to rounding, with the energy drift of the integrator and no other.
 
-use crate::closed_chain::four_bar;
-use crate::support::scenes::{dormand_prince, rk4};
+use crate::closed_chain::{four_bar, row_of_four_bars};
+use crate::support::loops::METHODS;
+use crate::support::scenes::{dormand_prince, rk4, run};
 use pliant::dynamics::Workspace;
 use pliant::dynamics::closed_chain::drift;
 use pliant::dynamics::energy::balance;
@@ -83,4 +84,36 @@ fn cut_four_bar_stays_closed_over_ten_thousand_turns_with_the_energy_drift_of_th
 #[test]
 fn embedded_four_bar_stays_closed_over_ten_thousand_turns_with_the_energy_drift_of_the_integrator() {
     runs_long("constraint_embedding", 1e-10);
+}
+
+/// C01: rods side by side pass the horizontal, where all loops lose rank at once, when the closed solution says.
+#[test]
+fn published_rows_of_four_bars_lie_flat_at_their_time() {
+    for (count, expected) in [(2, 0.714_355_529_292_960_5), (40, 0.721_581_024_825_656_8)] {
+        for method in METHODS {
+            let (system, start) = row_of_four_bars(count, method);
+            let first = system.hinge_index("foot0").unwrap();
+            let (q, v) = (system.bodies[first].position, system.bodies[first].velocity);
+            // closest sample before and after, each carried to the horizontal by its rate and acceleration
+            let mut passages = Vec::new();
+            run(&system, &start, dormand_prince(1e-9), expected + 0.05, 200.0, |s| {
+                let (angle, rate, change) = (s.state.position[q], s.state.velocity[v], s.workspace.acceleration.hinge[v]);
+                if angle.abs() < 0.1 {
+                    // 0 = angle + rate t + change t^2 / 2
+                    let t = -2.0 * angle / (rate - (rate * rate - 2.0 * change * angle).sqrt());
+                    passages.push((angle.abs(), s.state.time + t));
+                }
+            });
+            let nearest = passages.iter().min_by(|a, b| a.0.total_cmp(&b.0)).unwrap();
+            let through = passages.iter().any(|p| p.1 < expected + 1e-3);
+            println!(
+                "{count} four-bars, {method}: flat at {} s, off by {:e}, from {:e} rad away",
+                nearest.1,
+                nearest.1 - expected,
+                nearest.0
+            );
+            // the cubic term left out: less than (5 ms)^3 times a jerk of some hundred
+            assert!(through && (nearest.1 - expected).abs() < 1e-6, "{method}: {} against {expected}", nearest.1);
+        }
+    }
 }
