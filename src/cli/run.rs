@@ -307,13 +307,24 @@ impl Progress {
     }
 }
 
+impl Progress {
+    /// What Ctrl-C asks of the loop.
+    fn asked(&self) -> Flow {
+        if self.interrupted.load(Ordering::Relaxed) { Flow::Stop } else { Flow::Continue }
+    }
+}
+
 impl Observer for Progress {
     fn observe(&mut self, sample: &Sample<'_>) -> Flow {
         self.bar.set_position((sample.state.time * TICKS) as u64);
         if sample.steps.is_multiple_of(64) {
             self.bar.set_message(format!("t = {} s, {} steps", number(sample.state.time), sample.steps));
         }
-        if self.interrupted.load(Ordering::Relaxed) { Flow::Stop } else { Flow::Continue }
+        self.asked()
+    }
+
+    fn step(&mut self, _step: &Sample<'_>) -> Flow {
+        self.asked()
     }
 }
 

@@ -108,7 +108,7 @@ pub enum DynamicsError {
     /// Independent coordinates of an aggregate that move no mass.
     #[error(
         "the loops closed by {closures}: the inertia along {coordinate} of \"{body}\" is {inertia:e}, which is zero beside {scale:e}; \
-         give the bodies there mass or inertia, or hold the closures by the tree_augmented method"
+         give the bodies there mass or inertia"
     )]
     SingularAggregate {
         /// Names of the closures, quoted.
@@ -200,6 +200,12 @@ impl Workspace {
         self.closed.as_deref().map_or_else(Vector6::zeros, load)
     }
 
+    /// How near the cut loops are to a change point at the last evaluation; infinite without any.
+    #[must_use]
+    pub fn cut_distance_to_rank_loss(&self) -> f64 {
+        self.closed.as_ref().map_or(f64::INFINITY, |c| c.cut_distance_to_rank_loss())
+    }
+
     /// How near the loops are to a change point at the last evaluation, where they lose rank; infinite without closures.
     #[must_use]
     pub fn distance_to_rank_loss(&self) -> f64 {
@@ -247,6 +253,7 @@ pub fn forward_dynamics(system: &System, state: &State, workspace: &mut Workspac
     sweep::acceleration_outward::acceleration_outward(system, pose, velocity, inertia, force, acceleration);
     if let Some(chain) = closed {
         chain.close(system, pose, velocity, inertia, force, acceleration)?;
+        chain.check_closed(system, pose, velocity, acceleration)?;
         chain.recover_embedded(&aggregate::load::Swept { system, state, pose, velocity, inertia, acceleration }, force);
     }
     Ok(())

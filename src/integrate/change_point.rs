@@ -41,12 +41,12 @@ impl Passage {
         is_near(self.nearest)
     }
 
-    /// Error, in units of the relative tolerance, that a try which came as near as `distance` may have.
-    pub fn allowed_error(&mut self, distance: f64, relative: f64) -> f64 {
-        self.nearest = self.nearest.min(distance);
-        // what the rounding of the scaled loop inertia makes of accelerations
-        let rounding = REDUNDANT / (distance * distance * relative);
-        if is_near(distance) { rounding.clamp(1.0, LARGEST_ROUNDING) } else { 1.0 }
+    /// Error, in units of the relative tolerance, that a try may have which came as near as `all` (any loop) and `cut` (cut ones).
+    pub fn allowed_error(&mut self, [all, cut]: [f64; 2], relative: f64) -> f64 {
+        self.nearest = self.nearest.min(all);
+        // what the rounding of the scaled loop inertia makes of accelerations; embedded loops have none
+        let rounding = REDUNDANT / (cut * cut * relative);
+        if is_near(cut) { rounding.clamp(1.0, LARGEST_ROUNDING) } else { 1.0 }
     }
 
     /// After a failed try: the share of the last accepted step to leap, if it is time to.
@@ -66,10 +66,12 @@ mod tests {
     #[test]
     fn leaps_begin_near_a_change_point_after_some_tries_and_end() {
         let mut far = Passage::default();
-        assert_eq!(far.allowed_error(1.0, 1e-6), 1.0);
+        assert_eq!(far.allowed_error([1.0; 2], 1e-6), 1.0);
         assert!((0..20).all(|_| far.leap().is_none()));
         let mut near = Passage::default();
-        assert!(near.allowed_error(1e-4, 1e-6) > 99.0 && near.allowed_error(1e-9, 1e-6) <= LARGEST_ROUNDING);
+        assert!(near.allowed_error([1e-4; 2], 1e-6) > 99.0 && near.allowed_error([1e-9; 2], 1e-6) <= LARGEST_ROUNDING);
+        // embedded loops round no more than others do
+        assert_eq!(near.allowed_error([1e-9, f64::INFINITY], 1e-6), 1.0);
         let leaps: Vec<_> = (0..20).map(|_| near.leap()).collect();
         assert!(leaps[..2].iter().all(Option::is_none) && leaps[2] == Some(1.0) && leaps[8..].iter().all(Option::is_none));
     }

@@ -19,8 +19,8 @@ pub struct Chart<'a> {
     pub work: f64,
     /// Evaluations so far.
     pub evaluations: u64,
-    /// How near the loops came to a change point since this was last set.
-    pub nearest_rank_loss: f64,
+    /// How near the loops came to a change point since this was last set: all, and cut ones.
+    pub nearest_rank_loss: [f64; 2],
     /// The last evaluation.
     pub workspace: Workspace,
     state: State,
@@ -36,7 +36,7 @@ impl<'a> Chart<'a> {
             clock_rest: 0.0,
             work: 0.0,
             evaluations: 0,
-            nearest_rank_loss: f64::INFINITY,
+            nearest_rank_loss: [f64::INFINITY; 2],
             workspace: Workspace::new(system),
             state: start.clone(),
         }
@@ -104,7 +104,8 @@ impl<'a> Chart<'a> {
     fn rate_at(&mut self, state: &State, y: &[f64], rate: &mut [f64]) -> Result<(), DynamicsError> {
         self.evaluations += 1;
         let done = forward_dynamics(self.system, state, &mut self.workspace);
-        self.nearest_rank_loss = self.nearest_rank_loss.min(self.workspace.distance_to_rank_loss());
+        let [all, cut] = self.nearest_rank_loss;
+        self.nearest_rank_loss = [all.min(self.workspace.distance_to_rank_loss()), cut.min(self.workspace.cut_distance_to_rank_loss())];
         done?;
         let (n, nv) = (self.increments(), self.system.velocity_count);
         for body in &self.system.bodies {

@@ -8,6 +8,7 @@
 pub mod change_point;
 pub mod chart;
 pub mod choice;
+pub mod failure;
 pub mod observer;
 pub mod rosenbrock_w;
 pub mod runge_kutta;
@@ -17,10 +18,11 @@ pub mod step_control;
 pub mod tableau;
 pub mod w_tableau;
 
+pub use failure::RunFailure;
 pub use observer::{Flow, Observer, Sample};
 pub use rosenbrock_w::RosenbrockW;
 pub use runge_kutta::RungeKutta;
-pub use simulate::{Outcome, RunFailure, Settings, Summary, simulate};
+pub use simulate::{Outcome, Settings, Summary, simulate};
 
 use crate::dynamics::DynamicsError;
 use crate::model::State;

@@ -33,5 +33,7 @@ pub trait Observer {
     fn observe(&mut self, sample: &Sample<'_>) -> Flow;
 
     /// Called at the end of every accepted step, after the output times within it; the evaluation there costs nothing extra.
-    fn step(&mut self, _step: &Sample<'_>) {}
+    fn step(&mut self, _step: &Sample<'_>) -> Flow {
+        Flow::Continue
+    }
 }

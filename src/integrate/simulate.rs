@@ -2,6 +2,7 @@
 
 use super::change_point::{self, Passage};
 use super::chart::Chart;
+use super::failure::RunFailure;
 use super::observer::{Flow, Observer, Sample};
 use super::rosenbrock_w::RosenbrockW;
 use super::runge_kutta::RungeKutta;
@@ -11,9 +12,8 @@ use super::tableau::Tableau;
 use super::w_tableau::ROS34PW2;
 use super::{Stepper, tableau};
 use crate::dynamics::closed_chain::drift;
-use crate::dynamics::{DynamicsError, Workspace, forward_dynamics};
-use crate::model::{State, System};
-use thiserror::Error;
+use crate::dynamics::{Workspace, forward_dynamics};
+use crate::model::{ClosureMethod, State, System};
 
 /// A method with its step or tolerance.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -69,63 +69,6 @@ pub struct Settings {
     pub rate_hz: f64,
 }
 
-/// Why a run ended before its duration.
-#[derive(Debug, Error, Clone, PartialEq)]
-pub enum RunFailure {
-    /// An evaluation without an answer.
-    #[error("at t = {time} s: {source}")]
-    Dynamics {
-        /// s.
-        time: f64,
-        /// What went wrong.
-        source: DynamicsError,
-    },
-    /// Numbers that left the finite range.
-    #[error("at t = {time} s the motion left finite numbers, fastest in {place}; {remedy}")]
-    NotFinite {
-        /// Time of the last finite state (s).
-        time: f64,
-        /// Mode or hinge that moved fastest.
-        place: String,
-        /// What to do.
-        remedy: &'static str,
-    },
-    /// Loops that lose rank where the error control cannot pass.
-    #[error(
-        "at t = {time} s the loops pass a change point, where they lose rank{}; hold the closures by constraint_embedding, take fixed steps (rk4) or \
-         loosen relative_tolerance",
-        source.as_ref().map_or_else(String::new, |s| format!(" ({s})"))
-    )]
-    ChangePoint {
-        /// s.
-        time: f64,
-        /// What an evaluation there said, if it failed.
-        source: Option<DynamicsError>,
-    },
-    /// A loop that came open.
-    #[error("at t = {time} s closure \"{closure}\" came open by {residual:e} m or rad; take smaller steps or a smaller relative_tolerance")]
-    Opened {
-        /// s.
-        time: f64,
-        /// Name of the closure.
-        closure: String,
-        /// Largest violation left after the projection (m or rad).
-        residual: f64,
-    },
-    /// A step that became too small to advance time.
-    #[error(
-        "at t = {time} s the step fell to {step:e} s, fastest motion in {place}; loosen relative_tolerance or look for a discontinuity there"
-    )]
-    StepUnderflow {
-        /// s.
-        time: f64,
-        /// s.
-        step: f64,
-        /// Mode or hinge that moved fastest.
-        place: String,
-    },
-}
-
 /// How a run ended.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Outcome {
@@ -171,6 +114,7 @@ pub fn simulate(system: &System, start: &State, settings: &Settings, observers: 
         controller: stepper.controlled_order().map(Controller::new),
         step,
         accepted: step,
+        crept: 0,
         largest,
         relative: tolerance.map_or(0.0, |t| t.relative),
         output: Workspace::new(system),
@@ -235,6 +179,8 @@ struct Run<'r, 's> {
     step: f64,
     /// The last accepted step.
     accepted: f64,
+    /// Very short steps in a row.
+    crept: u32,
     largest: f64,
     relative: f64,
     output: Workspace,
@@ -263,6 +209,7 @@ impl Run<'_, '_> {
             while self.chart.base.time < stop {
                 let done = self.advance(stepper, stop).and_then(|taken| {
                     self.steps += 1;
+                    self.creep(taken, end - start)?;
                     let flow = self.emit(stepper, taken, observers);
                     stepper.accept(self.chart);
                     if self.chart.base.time + 4.0 * f64::EPSILON * stop.abs() >= stop {
@@ -276,8 +223,8 @@ impl Run<'_, '_> {
                     let chart = &*self.chart;
                     let (state, workspace) = (&chart.base, &chart.workspace);
                     let step = Sample { system: chart.system, state, workspace, work: chart.work, steps: self.steps };
-                    observers.iter_mut().for_each(|o| o.step(&step));
-                    flow
+                    let asked = observers.iter_mut().fold(Flow::Continue, |f, o| if o.step(&step) == Flow::Stop { Flow::Stop } else { f });
+                    if asked == Flow::Stop { Ok(Flow::Stop) } else { flow }
                 });
                 match done {
                     Ok(Flow::Continue) => {}
@@ -295,12 +242,18 @@ impl Run<'_, '_> {
         Outcome::Completed
     }
 
+    /// True if some closure is cut.
+    fn has_cut(&self) -> bool {
+        self.chart.system.closures.iter().any(|c| c.method == ClosureMethod::TreeAugmented)
+    }
+
     /// Takes back what the last step drifted off the closures.
     fn hold_closures(&mut self, stepper: &mut dyn Stepper) -> Result<(), RunFailure> {
         let time = self.chart.base.time;
-        let near = change_point::is_near(self.chart.nearest_rank_loss);
+        let cut = self.has_cut();
+        let near = change_point::is_near(self.chart.nearest_rank_loss[0]);
         let wrap = |source| {
-            if near { RunFailure::ChangePoint { time, source: Some(source) } } else { RunFailure::Dynamics { time, source } }
+            if near { RunFailure::ChangePoint { time, cut, source: Some(source) } } else { RunFailure::Dynamics { time, source } }
         };
         let chart = &mut *self.chart;
         let drift = drift::project(chart.system, &mut chart.base, &mut chart.workspace).map_err(wrap)?;
@@ -308,6 +261,20 @@ impl Run<'_, '_> {
             return Err(opened(chart.system, &chart.workspace, time));
         }
         if drift.moved { stepper.restart(chart).map_err(wrap) } else { Ok(()) }
+    }
+
+    /// Ends a run that hardly moves: it would take longer than anyone waits.
+    fn creep(&mut self, taken: f64, duration: f64) -> Result<(), RunFailure> {
+        self.crept = if taken < CREEPING * duration { self.crept + 1 } else { 0 };
+        if self.crept < CREEPING_STEPS {
+            return Ok(());
+        }
+        let time = self.chart.base.time;
+        Err(if change_point::is_near(self.chart.nearest_rank_loss[0]) {
+            RunFailure::ChangePoint { time, cut: self.has_cut(), source: None }
+        } else {
+            RunFailure::StepUnderflow { time, step: taken, place: fastest_place(self.chart) }
+        })
     }
 
     /// Finds a step towards `stop` that meets the tolerance; returns its length.
@@ -328,7 +295,7 @@ impl Run<'_, '_> {
             if step < floor && step < left {
                 let place = fastest_place(self.chart);
                 if passage.is_near() && self.chart.base.is_finite() {
-                    return Err(RunFailure::ChangePoint { time, source: None });
+                    return Err(RunFailure::ChangePoint { time, cut: self.has_cut(), source: None });
                 }
                 return Err(if self.sampled.is_finite() && self.sampled.time > time {
                     RunFailure::StepUnderflow { time, step, place }
@@ -336,7 +303,7 @@ impl Run<'_, '_> {
                     RunFailure::NotFinite { time, place, remedy: "look at the loads and springs that act there" }
                 });
             }
-            self.chart.nearest_rank_loss = f64::INFINITY;
+            self.chart.nearest_rank_loss = [f64::INFINITY; 2];
             let attempted = stepper.attempt(self.chart, step);
             let Some(controller) = &mut self.controller else {
                 let diverged = match attempted {
@@ -376,8 +343,9 @@ impl Run<'_, '_> {
                     self.rejected += 1;
                     self.step = 0.1 * step;
                     if self.step < floor {
+                        let cut = self.has_cut();
                         return Err(if passage.is_near() {
-                            RunFailure::ChangePoint { time, source: Some(source) }
+                            RunFailure::ChangePoint { time, cut, source: Some(source) }
                         } else {
                             RunFailure::Dynamics { time, source }
                         });
@@ -434,6 +402,10 @@ impl Run<'_, '_> {
         Ok(flow)
     }
 }
+
+/// Share of the duration below which steps creep, and how many of them in a row end a run.
+const CREEPING: f64 = 1e-10;
+const CREEPING_STEPS: u32 = 1000;
 
 /// Violation (m or rad) that no projection should leave: the motion of such a system is not the system's.
 const OPEN: f64 = 1e-6;

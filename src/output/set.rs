@@ -146,8 +146,9 @@ impl<'s> OutputSet<'s> {
 }
 
 impl Observer for OutputSet<'_> {
-    fn step(&mut self, step: &Sample<'_>) {
+    fn step(&mut self, step: &Sample<'_>) -> Flow {
         self.tracker.follow_step(step);
+        Flow::Continue
     }
 
     fn observe(&mut self, sample: &Sample<'_>) -> Flow {

@@ -1,14 +1,17 @@
 //! Loops over long times: closed to rounding, with the energy drift of the integrator and no other.
 
-use crate::closed_chain::{four_bar, row_of_four_bars};
-use crate::support::loops::METHODS;
-use crate::support::scenes::{dormand_prince, rk4, run};
+use crate::closed_chain::{closure, four_bar, rod, row_of_four_bars};
+use crate::support::loops::{METHODS, held_by};
+use crate::support::scenes::{G, Z, dormand_prince, hinge, rk4, run};
+use nalgebra::Vector3;
 use pliant::dynamics::Workspace;
 use pliant::dynamics::closed_chain::drift;
 use pliant::dynamics::energy::balance;
 use pliant::dynamics::world::WorldFrame;
 use pliant::integrate::simulate::Method;
+use pliant::integrate::step_control::Tolerance;
 use pliant::integrate::{Flow, Observer, Outcome, Sample, Settings, simulate};
+use pliant::model::build::{Definition, WORLD};
 use std::f64::consts::TAU;
 
 /// What a long run is watched for.
@@ -115,5 +118,28 @@ fn published_rows_of_four_bars_lie_flat_at_their_time() {
             // the cubic term left out: less than (5 ms)^3 times a jerk of some hundred
             assert!(through && (nearest.1 - expected).abs() < 1e-6, "{method}: {} against {expected}", nearest.1);
         }
+    }
+}
+
+/// Three rods stretched to their full length: a structure that cannot move to first order, at its only state. No integrator hangs on it.
+#[test]
+fn stretched_chain_ends_with_a_result_or_a_message() {
+    let rosenbrock_w = Method::RosenbrockW { tolerance: Tolerance { relative: 1e-6, absolute: 1e-6 }, largest_step: f64::INFINITY };
+    for (method, by) in METHODS.into_iter().flat_map(|m| [rosenbrock_w, dormand_prince(1e-6), rk4(1e-3)].map(|by| (m, by))) {
+        let mut last = hinge("D", "revolute", &[Z], WORLD, "rod2", [3.0, 0.0, 0.0]);
+        last.position = vec![std::f64::consts::PI];
+        let hinges = vec![
+            hinge("A", "revolute", &[Z], WORLD, "rod0", [0.0; 3]),
+            hinge("B", "revolute", &[Z], "rod0", "rod1", [1.0, 0.0, 0.0]),
+            last,
+        ];
+        let bodies = (0..3).map(|i| rod(&format!("rod{i}"), 1.0)).collect();
+        let closures = vec![closure("C", "revolute", &[Z], "rod1", [1.0, 0.0, 0.0], "rod2", [1.0, 0.0, 0.0])];
+        let definition = Definition { gravity: Vector3::new(0.0, -G, 0.0), bodies, hinges, closures, ..Definition::default() };
+        let (system, state) = held_by(method, definition).build().unwrap();
+        let summary = simulate(&system, &state, &Settings { duration: 0.2, method: by, rate_hz: 10.0 }, &mut []);
+        println!("stretched chain, {method}, {}: {:?} after {} steps", by.name(), summary.outcome, summary.steps);
+        let Outcome::Failed(failure) = summary.outcome else { continue };
+        assert!(!failure.to_string().is_empty());
     }
 }

@@ -85,3 +85,31 @@ pub fn random_loops(seed: u64, recipe: &Recipe, count: usize) -> Definition {
     close_here(&mut definition);
     definition
 }
+
+/// Adds `count` gears between random coordinates, closed at the initial state: between branches, along a chain, within one hinge.
+pub fn add_gears(definition: &mut Definition, seed: u64, count: usize) {
+    let rng = &mut StdRng::seed_from_u64(seed ^ 0x9ea5);
+    let (system, state) = definition.build().unwrap();
+    let plain = system.bodies.iter().filter(|b| !b.hinge.kind.has_quaternion());
+    let coordinates: Vec<_> =
+        plain.flat_map(|b| (0..b.hinge.kind.rate_count()).map(|i| (b.hinge.name.clone(), i, state.position[b.position + i]))).collect();
+    if coordinates.len() < 2 {
+        return;
+    }
+    for g in 0..count {
+        let a = rng.random_range(0..coordinates.len());
+        let b = (a + rng.random_range(1..coordinates.len())) % coordinates.len();
+        let ratio: f64 = rng.random_range(0.3..3.0);
+        let [(hinge_a, i, qa), (hinge_b, j, qb)] = [&coordinates[a], &coordinates[b]];
+        definition.closures.push(ClosureDefinition {
+            name: format!("g{g}"),
+            kind: "gear".into(),
+            a: hinge_a.clone(),
+            b: hinge_b.clone(),
+            coordinates: [Some(i + 1), Some(j + 1)],
+            ratio: Some(ratio),
+            offset: Some(qb - ratio * qa),
+            ..ClosureDefinition::default()
+        });
+    }
+}

@@ -32,7 +32,7 @@ pub struct Embedding {
     pub held: bool,
     /// Smallest pivot relative to its value when the coordinates were chosen.
     pub pivot_ratio: f64,
-    /// Smallest scaled pivot of the choice: how far from losing rank the closures were.
+    /// Smallest scaled pivot of the choice: how far from losing rank the closures were; infinite if nothing is dependent.
     pub smallest_pivot: f64,
     rows: usize,
     /// c x n, by columns.
@@ -269,9 +269,6 @@ impl Embedding {
                 }
             }
         }
-        if self.dependent.is_empty() {
-            self.smallest_pivot = 0.0;
-        }
         self.independent.extend((0..n).filter(|j| aggregate.free[*j] && !self.dependent.contains(j)));
     }
 
@@ -301,7 +298,8 @@ impl Embedding {
             self.pivots.extend((0..r).map(|d| self.R[d * c + d]));
         }
         let ratio = |d: usize| self.R[d * c + d] / self.pivots[d];
-        self.pivot_ratio = (0..r).map(ratio).fold(1.0, f64::min);
+        // what is not a number must not be lost in the minimum
+        self.pivot_ratio = (0..r).map(ratio).fold(1.0, |m: f64, x| if x >= m { m } else { x });
     }
 
     /// Largest part of an independent column outside the span of Q, relative to the column: blocked directions that nothing holds.

@@ -1,16 +1,12 @@
 //! Closures that are embedded in aggregates, as the rest of an evaluation sees them: closed, free of contradiction, and loaded.
 
-use super::ClosedChain;
+use super::{CONTRADICTION, ClosedChain, rounding_of_rates};
 use crate::dynamics::DynamicsError;
 use crate::dynamics::aggregate::load::Swept;
 use crate::dynamics::sweep::force_inward::ForceScratch;
 use crate::dynamics::sweep::pose_outward::PoseScratch;
 use crate::dynamics::sweep::velocity_outward::VelocityScratch;
 use crate::model::{State, System};
-
-/// Share of the closures' accelerations that may lie where no coordinate reaches before they are said to contradict one another:
-/// closures assembled to 1e-10 leave less, and motions that no loop allows leave all.
-const CONTRADICTION: f64 = 1e-6;
 
 /// Refuses aggregates whose loops lose rank, or whose closures and prescribed motions contradict one another, after the velocity sweep.
 ///
@@ -25,7 +21,7 @@ pub fn check_embedded(system: &System, pose: &PoseScratch, velocity: &VelocitySc
             return Err(DynamicsError::ChangePoint { closure: system.closures[worst()].name.clone() });
         }
         let [missed, size] = bias.missed;
-        if missed > CONTRADICTION * size {
+        if missed > CONTRADICTION * size && missed > rounding_of_rates(velocity) {
             return Err(DynamicsError::ContradictoryClosures {
                 closure: system.closures[worst()].name.clone(),
                 rank: embedding.rank(),

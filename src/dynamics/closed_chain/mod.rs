@@ -21,9 +21,12 @@ pub mod least_norm;
 pub mod schur;
 pub mod tree_augmented;
 
+use super::DynamicsError;
+use super::aggregate::Embedding;
 use super::aggregate::closing::Closing;
 use super::aggregate::load::AggregateLoad;
 use super::sweep::acceleration_outward::AccelerationScratch;
+use super::sweep::force_inward::world_acceleration;
 use super::sweep::inertia_inward::InertiaScratch;
 use super::sweep::pose_outward::PoseScratch;
 use super::sweep::response::Response;
@@ -193,7 +196,7 @@ impl ClosedChain {
         for (c, &row) in self.cut.iter().enumerate() {
             shares[row] = self.schur.redundancy(c);
         }
-        let mut smallest = if self.cut.is_empty() { f64::INFINITY } else { self.schur.distance_to_rank_loss() };
+        let mut smallest = self.cut_distance_to_rank_loss();
         let mut rank = self.schur.rank();
         for (aggregate, embedding) in system.aggregates.iter().zip(&pose.embeddings) {
             let rows = aggregate.closures.iter().flat_map(|&c| system.closures[c].rows());
@@ -213,8 +216,46 @@ impl ClosedChain {
     /// How near the loops are to a change point, where they lose rank; see [`RankReport::smallest`].
     #[must_use]
     pub fn distance_to_rank_loss(&self, pose: &PoseScratch) -> f64 {
-        let cut = if self.cut.is_empty() { f64::INFINITY } else { self.schur.distance_to_rank_loss() };
-        pose.embeddings.iter().map(|e| e.smallest_pivot * e.pivot_ratio).fold(cut, f64::min)
+        pose.embeddings.iter().map(|e| e.smallest_pivot * e.pivot_ratio).fold(self.cut_distance_to_rank_loss(), f64::min)
+    }
+
+    /// The same of the cut closures alone; infinite without any.
+    #[must_use]
+    pub fn cut_distance_to_rank_loss(&self) -> f64 {
+        if self.cut.is_empty() { f64::INFINITY } else { self.schur.distance_to_rank_loss() }
+    }
+
+    /// Refuses accelerations that open a closure: what no multiplier or coordinate reaches, whatever the scales of its rows.
+    ///
+    /// # Errors
+    /// Naming the closure that opens fastest.
+    pub fn check_closed(
+        &mut self,
+        system: &System,
+        pose: &PoseScratch,
+        velocity: &VelocityScratch,
+        acceleration: &AccelerationScratch,
+    ) -> Result<(), DynamicsError> {
+        let mut opening = std::mem::take(&mut self.right);
+        self.accelerations(system, pose, acceleration, world_acceleration(system), &mut opening);
+        let (mut worst, mut fastest, mut felt) = (0, 0.0_f64, 0.0_f64);
+        for (index, closure) in system.closures.iter().enumerate() {
+            for row in closure.rows() {
+                let open = (opening[row] + velocity.closure_bias[row]).abs();
+                felt = felt.max(velocity.closure_bias[row].abs());
+                // what is not a number is left to those who look for it
+                if open > fastest {
+                    (worst, fastest) = (index, open);
+                }
+            }
+        }
+        self.right = opening;
+        felt = self.loaded.iter().map(|&k| acceleration.alpha[k].amax()).fold(felt, f64::max);
+        if fastest <= OPENING * felt + rounding_of_rates(velocity) {
+            return Ok(());
+        }
+        let rank = self.schur.rank() + pose.embeddings.iter().map(Embedding::rank).sum::<usize>();
+        Err(DynamicsError::ContradictoryClosures { closure: system.closures[worst].name.clone(), rank, rows: self.lambda.len() })
     }
 
     /// Accelerations of all blocked directions; `world` is the acceleration of the world.
@@ -222,6 +263,19 @@ impl ClosedChain {
         let motion = Motion { body: |k: usize| acceleration.alpha[k], world, hinge: &acceleration.hinge, modal: Some(&acceleration.modal) };
         along(system, pose, &motion, out);
     }
+}
+
+/// Share of the largest acceleration by which a closure may yet open once all loops are solved: rounding, which near a change point grows.
+const OPENING: f64 = 1e-5;
+
+/// Share of the closures' accelerations that may lie where nothing reaches before they are said to contradict one another: closures
+/// assembled to 1e-10 leave less, and motions that no loop allows leave all.
+const CONTRADICTION: f64 = 1e-6;
+
+/// Accelerations (m/s^2 or rad/s^2) that rates make which assembly leaves as rounding: below these nothing contradicts.
+fn rounding_of_rates(velocity: &VelocityScratch) -> f64 {
+    let speed = velocity.bodies.iter().map(|b| b.V.amax()).fold(1.0, f64::max);
+    assembly::FITS * speed * speed
 }
 
 /// Motion along the blocked directions of all closures.

@@ -153,12 +153,13 @@ impl Schur {
         self.size() - self.null_count
     }
 
-    /// Square root of the smallest scaled eigenvalue kept, over that of the largest: how near the next loss of rank is.
+    /// Square root of the smallest scaled eigenvalue kept, over that of the largest: how near the next loss of rank is. Infinite where
+    /// nothing is kept: there is no rank to lose.
     #[must_use]
     pub fn distance_to_rank_loss(&self) -> f64 {
         match (self.values.get(self.null_count), self.values.last()) {
             (Some(small), Some(large)) if *large > 0.0 => (small / large).sqrt(),
-            _ => 0.0,
+            _ => f64::INFINITY,
         }
     }
 

@@ -6,7 +6,7 @@
 
 use super::constraint::Motion;
 use super::schur::{NotFactored, REDUNDANT};
-use super::{ClosedChain, along};
+use super::{CONTRADICTION, ClosedChain, along, rounding_of_rates};
 use crate::dynamics::DynamicsError;
 use crate::dynamics::sweep::acceleration_outward::AccelerationScratch;
 use crate::dynamics::sweep::force_inward::{ForceScratch, world_acceleration};
@@ -16,9 +16,6 @@ use crate::dynamics::sweep::response::Response;
 use crate::dynamics::sweep::velocity_outward::VelocityScratch;
 use crate::model::System;
 use nalgebra::Vector6;
-
-/// Share of the closures' accelerations that may lie where no multiplier reaches before they are said to contradict one another.
-const CONTRADICTION: f64 = 1e-6;
 
 impl ClosedChain {
     /// Adds the correction pass of the cut closures to the free pass in `force` and `acceleration`; nothing happens if none is cut.
@@ -54,7 +51,8 @@ impl ClosedChain {
         // a right-hand side of rounding has no direction: it is measured against the accelerations it is the difference of
         let felt = self.support.iter().map(|&k| acceleration.alpha[k].amax()).fold(sizes, f64::max);
         let scale = self.schur.largest_scale();
-        if (missed > CONTRADICTION * size && missed > 1e-9 * felt * scale) || rigid > 1e-9 * felt {
+        let rounding = (1e-9 * felt).max(rounding_of_rates(velocity));
+        if (missed > CONTRADICTION * size && missed > rounding * scale) || rigid > rounding {
             return Err(self.contradiction(system));
         }
 
