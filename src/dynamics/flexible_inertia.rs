@@ -4,11 +4,21 @@
 //! `M_ff = 1`, `M_fv = p_j`, `M_fw row j = int rho x x phi_j` (antisymmetric part of W),
 //! `m c(eta) = m c + sum p_j eta_j`, `J(eta)` from `int rho x x'`; and the node accelerations `omega x (omega x x) + 2 omega x u_dot`
 //! integrated with 1, x and phi_j give b. Source: DESIGN of the project, section 3.1; checked against nodal sums in the tests.
+//!
+//! Geometric stiffness is the displacement `s = 1/2 eta' Gamma eta` that comes with a deformation (a bent beam grows shorter). The kinetic
+//! energy gains `int rho D(r) . D(s)`, D the rate in inertial axes: the product of `s` with the motion of the undeformed body. Products of
+//! `s` with the modes and with itself are dropped (higher powers of eta in every equation). What is kept is a Lagrangian, so energy is
+//! conserved exactly:
+//! `W_j,ab += int rho (Gamma_a eta)_j r_b`, `p_j += (int rho Gamma eta)_j`, `m c += 1/2 eta' int rho Gamma eta`, `J` from `r s' + s r'`;
+//! virtual displacements `Gamma eta` of the modes meet the acceleration of the undeformed body only, which W holds already, and the
+//! accelerations `Gamma(eta_dot, eta_dot) + 2 omega x s_dot + omega x (omega x s)` load the rigid rows only.
+//! The energy is no longer a sum of squares: where modes carry nearly all inertia about a hinge (as they should), it stays positive only
+//! up to deflections whose `1/2 eta' int rho r Gamma eta` is below what the modes leave over.
 #![expect(non_snake_case, reason = "symbols follow the table in dynamics/mod.rs")]
 
 use crate::model::flexible_body::{InertiaOrder, ModalIntegrals, TENSOR};
 use crate::spatial::SpatialInertia;
-use crate::spatial::shift::spatial;
+use crate::spatial::shift::{linear, spatial};
 use nalgebra::{Matrix3, Vector3, Vector6};
 
 /// Inertia of a flexible body at its present deformation.
@@ -59,6 +69,22 @@ impl FlexibleInertia {
             let other = if order == InertiaOrder::Second { sum(&self.W) } else { undeformed.transpose() };
             second_moment += undeformed + other;
         }
+        let second_order = if order >= InertiaOrder::First { integrals.second_order.as_slice() } else { &[] };
+        for (row, p) in self.row.iter_mut().zip(&integrals.momentum) {
+            *row = spatial(&Vector3::zeros(), p);
+        }
+        // the angular planes are in W
+        for (c, plane) in second_order.chunks_exact((n * n).max(1)).enumerate().skip(3) {
+            let mut shift = 0.0;
+            for ((row, column), e) in self.row.iter_mut().zip(plane.chunks_exact(n)).zip(eta) {
+                let of_mode = dot(column, eta);
+                row[c] += of_mode;
+                shift += 0.5 * of_mode * e;
+            }
+            if order == InertiaOrder::Second {
+                first_moment[c - 3] += shift;
+            }
+        }
         self.first_moment = first_moment;
         self.inertia = Matrix3::from_diagonal_element(second_moment.trace()) - second_moment;
         self.inertia = (self.inertia + self.inertia.transpose()) * 0.5;
@@ -67,7 +93,7 @@ impl FlexibleInertia {
         for j in 0..n {
             let angular = Vector3::new(W(2, 1, j) - W(1, 2, j), W(0, 2, j) - W(2, 0, j), W(1, 0, j) - W(0, 1, j));
             let rotary = integrals.rotary.get(j).copied().unwrap_or_default();
-            self.row[j] = spatial(&(angular + rotary), &integrals.momentum[j]);
+            self.row[j].fixed_rows_mut::<3>(0).copy_from(&(angular + rotary));
         }
     }
 
@@ -83,7 +109,7 @@ impl FlexibleInertia {
         let n = integrals.mode_count();
         // D_ab = int rho u_dot_a x_b
         let D = Matrix3::from_fn(|a, b| dot(&self.W[(3 * a + b) * n..][..n], eta_dot));
-        let momentum: Vector3<f64> = integrals.momentum.iter().zip(eta_dot).map(|(p, e)| p * *e).sum();
+        let momentum: Vector3<f64> = self.row.iter().zip(eta_dot).map(|(r, e)| linear(r) * *e).sum();
         let moment = omega.cross(&(self.inertia * omega)) + (omega * D.trace() - D * omega) * 2.0;
         let force = omega.cross(&omega.cross(&self.first_moment)) + omega.cross(&momentum) * 2.0;
         // (omega omega' - omega^2) : W_j
@@ -104,7 +130,14 @@ impl FlexibleInertia {
                 }
             }
         }
-        spatial(&moment, &force)
+        let mut b = spatial(&moment, &force);
+        if order >= InertiaOrder::First {
+            // int rho (r x, 1) Gamma(eta_dot, eta_dot)
+            for (b, plane) in b.iter_mut().zip(integrals.second_order.chunks_exact((n * n).max(1))) {
+                *b += plane.chunks_exact(n).zip(eta_dot).map(|(column, e)| dot(column, eta_dot) * e).sum::<f64>();
+            }
+        }
+        b
     }
 }
 

@@ -85,6 +85,24 @@ pub enum DynamicsError {
         /// What it was compared with.
         scale: f64,
     },
+    /// A deflection beyond what an energy of second order can hold.
+    #[error(
+        "hinge \"{hinge}\" between \"{parent}\" and \"{child}\": the outboard inertia along its rate {rate} is {inertia:e}: bodies are bent further than \
+         geometric stiffness allows for where modes carry nearly all inertia; give \"{child}\" inertia there, retain fewer modes, or leave out \
+         geometric_stiffness outboard"
+    )]
+    OverDeformed {
+        /// Name of the hinge.
+        hinge: String,
+        /// Name of the parent body, or "world".
+        parent: String,
+        /// Name of the child body.
+        child: String,
+        /// 1-based number of the rate.
+        rate: usize,
+        /// Pivot of `D` found.
+        inertia: f64,
+    },
     /// Modes that carry more mass than the body has, seen from its inboard hinge.
     #[error(
         "body \"{body}\": its modes, held at the inboard hinge, have no positive definite mass; check the modal file with `pliant check`"
@@ -145,20 +163,34 @@ pub enum DynamicsError {
 }
 
 impl DynamicsError {
+    /// What an inertia that is not positive along rate `rate` of the hinge of body `k` means.
+    fn of_hinge(system: &System, k: usize, rate: usize, inertia: f64, scale: f64) -> Self {
+        let body = &system.bodies[k];
+        let (hinge, child, rate) = (body.hinge.name.clone(), body.name.clone(), rate + 1);
+        let parent = body.parent.map_or_else(|| "world".to_owned(), |p| system.bodies[p].name.clone());
+        let stiffens = system.bodies.iter().any(|b| b.flexible().is_some_and(crate::model::FlexibleBody::stiffens));
+        if stiffens && inertia.is_finite() && is_negative(inertia, scale) {
+            return Self::OverDeformed { hinge, parent, child, rate, inertia };
+        }
+        Self::SingularHinge { hinge, parent, child, rate, inertia, scale }
+    }
+
     /// True if the numbers themselves broke down, as in a motion that diverges: an inertia that is negative beyond rounding or not a
     /// number belongs to no model.
     #[must_use]
     pub fn is_breakdown(&self) -> bool {
         match self {
-            // half of the digits lost is beyond rounding
-            Self::SingularHinge { inertia, scale, .. } | Self::SingularAggregate { inertia, scale, .. } => {
-                !(inertia.is_finite() && scale.is_finite() && *inertia >= -1e-8 * scale.abs())
-            }
+            Self::SingularHinge { inertia, scale, .. } | Self::SingularAggregate { inertia, scale, .. } => is_negative(*inertia, *scale),
             Self::Unclosed { residual, .. } => !residual.is_finite(),
-            Self::SingularModes { .. } | Self::ContradictoryClosures { .. } | Self::ChangePoint { .. } => false,
+            Self::SingularModes { .. } | Self::OverDeformed { .. } | Self::ContradictoryClosures { .. } | Self::ChangePoint { .. } => false,
             Self::BrokenClosures { .. } => true,
         }
     }
+}
+
+/// True if an inertia is no number, or negative beyond rounding: with more than half of the digits of `scale`.
+fn is_negative(inertia: f64, scale: f64) -> bool {
+    !(inertia.is_finite() && scale.is_finite() && inertia >= -1e-8 * scale.abs())
 }
 
 /// Everything an evaluation writes, allocated once per system.

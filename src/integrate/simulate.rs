@@ -422,7 +422,7 @@ fn is_torn_apart(chart: &Chart<'_>) -> bool {
     chart.system.bodies.iter().zip(&chart.workspace.pose.bodies).any(|(body, pose)| match (body.flexible(), pose.flexible) {
         (Some(flexible), Some(index)) => {
             let undeformed = 2.0 * flexible.integrals.second_moment.trace();
-            chart.workspace.pose.flexible[index].inertia.inertia.trace() > 1e6 * undeformed
+            chart.workspace.pose.flexible[index].inertia.inertia.trace().abs() > 1e6 * undeformed
         }
         _ => false,
     })

@@ -330,6 +330,12 @@ impl Builder<'_> {
             order: flexible.order,
             inboard,
             mode_numbers: flexible.mode_numbers.clone(),
+            unused_stiffening: match &flexible.modal.geometric_stiffness {
+                Some(matrices) if !flexible.integrals.has_geometric_stiffness() => {
+                    (0..n).map(|j| std::array::from_fn(|load| matrices[load][(j, j)])).collect()
+                }
+                _ => Vec::new(),
+            },
         })
     }
 

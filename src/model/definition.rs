@@ -38,7 +38,7 @@ pub enum BodyDefinitionKind {
 pub struct FlexibleDefinition {
     /// Data of the retained modes.
     pub modal: Arc<ModalBody>,
-    /// The same, packed; share it between bodies of one file and one choice of modes.
+    /// The same, packed, with its geometric stiffness or without; share it between bodies of one file and one choice of modes.
     pub integrals: Arc<ModalIntegrals>,
     /// 1-based numbers of the retained modes in the file.
     pub mode_numbers: Vec<usize>,

@@ -21,6 +21,8 @@ pub enum InertiaOrder {
 
 /// Number of independent components of a 3 x 3 tensor.
 pub const TENSOR: usize = 9;
+/// Number of unit inertial loads of the geometric stiffness.
+pub const INERTIAL_LOADS: usize = 12;
 
 /// Modal integrals of one modal file for one choice of modes, shared by the bodies that use it.
 ///
@@ -43,10 +45,52 @@ pub struct ModalIntegrals {
     pub shape_cross: Vec<f64>,
     /// Per mode, angular momentum of rotary inertia (kg^(1/2) m); empty without.
     pub rotary: Vec<Vector3<f64>>,
+    /// Six planes of n x n, symmetric: `int rho (r x Gamma_jk)_c`, then `int rho Gamma_jk,c`, of the second-order displacement
+    /// `1/2 eta' Gamma eta` that geometric stiffness stands for; empty without. `shape_shape` holds its `int rho Gamma_jk,a r_b` too.
+    pub second_order: Vec<f64>,
 }
 
 impl ModalIntegrals {
-    /// Packs the integrals of `body`.
+    /// Packs the integrals of `body`, and its geometric stiffness where it has that.
+    #[must_use]
+    pub fn with_geometric_stiffness(body: &ModalBody) -> Self {
+        let mut packed = Self::of(body);
+        if let Some(matrices) = &body.geometric_stiffness {
+            packed.add_geometric_stiffness(matrices);
+        }
+        packed
+    }
+
+    /// Adds the second-order displacement field whose work under the 12 unit inertial loads makes the geometric stiffness.
+    ///
+    /// A frame acceleration `a(r)` loads the body by `-rho a`, so `K = int rho a_b Gamma_b`: `K_acc,b = int rho Gamma_b`, and with
+    /// `N_ab = int rho r_a Gamma_b`: `K_alpha,c = N_ab - N_ba` (abc cyclic), `K_omega,ab = N_ab + N_ba`, `K_omega,aa = N_aa - tr N`.
+    fn add_geometric_stiffness(&mut self, matrices: &[DMatrix<f64>]) {
+        let n = self.mode_count();
+        let square = n * n;
+        let at = |load: usize, i: usize| 0.5 * (matrices[load][(i % n, i / n)] + matrices[load][(i / n, i % n)]);
+        self.second_order = (0..6).map(|l| (l + 3) % 6).flat_map(|load| (0..square).map(move |i| at(load, i))).collect();
+        for i in 0..square {
+            let squares = 0.5 * (at(6, i) + at(7, i) + at(8, i));
+            for a in 0..3 {
+                self.shape_shape[4 * a * square + i] += at(6 + a, i) - squares;
+            }
+            for (c, product) in [(0, 10), (1, 11), (2, 9)] {
+                let (a, b) = ((c + 1) % 3, (c + 2) % 3);
+                // plane (b, a) takes Gamma_b r_a
+                self.shape_shape[(3 * b + a) * square + i] += 0.5 * (at(product, i) + at(3 + c, i));
+                self.shape_shape[(3 * a + b) * square + i] += 0.5 * (at(product, i) - at(3 + c, i));
+            }
+        }
+    }
+
+    /// True if geometric stiffness is in.
+    #[must_use]
+    pub fn has_geometric_stiffness(&self) -> bool {
+        !self.second_order.is_empty()
+    }
+
+    /// Packs the integrals of `body` without its geometric stiffness.
     #[must_use]
     pub fn of(body: &ModalBody) -> Self {
         let n = body.mode_count();
@@ -82,6 +126,7 @@ impl ModalIntegrals {
             shape_shape,
             shape_cross,
             rotary,
+            second_order: Vec::new(),
         }
     }
 
@@ -153,6 +198,8 @@ pub struct FlexibleBody {
     pub inboard: Attachment,
     /// 1-based numbers of the retained modes in the modal file.
     pub mode_numbers: Vec<usize>,
+    /// Per mode, the diagonal of the 12 geometric stiffness matrices that the modal data have but the integrals leave out; empty if none.
+    pub unused_stiffening: Vec<[f64; INERTIAL_LOADS]>,
 }
 
 impl FlexibleBody {
@@ -160,6 +207,12 @@ impl FlexibleBody {
     #[must_use]
     pub fn mode_count(&self) -> usize {
         self.stiffness.len()
+    }
+
+    /// True if geometric stiffness takes part in the motion.
+    #[must_use]
+    pub fn stiffens(&self) -> bool {
+        self.integrals.has_geometric_stiffness() && self.order >= InertiaOrder::First
     }
 
     /// Highest natural frequency of the retained modes (Hz), zero without modes.

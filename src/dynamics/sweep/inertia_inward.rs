@@ -182,14 +182,8 @@ pub fn inertia_inward_with(
         }
         let own = &mut out.bodies[k];
         let block = added.and_then(|a| a.hinge[k].as_ref());
-        eliminate_hinge(body, &pose.bodies[k].hinge.map, block, own).map_err(|(rate, inertia, scale)| DynamicsError::SingularHinge {
-            hinge: body.hinge.name.clone(),
-            parent: body.parent.map_or_else(|| "world".to_owned(), |p| system.bodies[p].name.clone()),
-            child: body.name.clone(),
-            rate: rate + 1,
-            inertia,
-            scale,
-        })?;
+        eliminate_hinge(body, &pose.bodies[k].hinge.map, block, own)
+            .map_err(|(rate, inertia, scale)| DynamicsError::of_hinge(system, k, rate, inertia, scale))?;
         if let Some(parent) = body.parent {
             own.S = own.P_plus.rotated(&pose.bodies[k].rotation);
             let felt = own.S.moved_by(&pose.bodies[k].l);
