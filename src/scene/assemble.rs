@@ -327,6 +327,7 @@ impl Assembly<'_> {
             ("modes", body.modes.is_some()),
             ("damping_ratio", body.damping_ratio.is_some()),
             ("inertia_order", body.inertia_order.is_some()),
+            ("geometric_stiffness", body.geometric_stiffness.is_some()),
             ("modal_position", !body.modal_position.is_empty()),
             ("modal_velocity", !body.modal_velocity.is_empty()),
         ];

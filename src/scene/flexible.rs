@@ -19,10 +19,9 @@ impl Assembly<'_> {
         if modes.len() < full.mode_count() {
             self.left_out.push(format!("{} of {} modes of \"{}\"", full.mode_count() - modes.len(), full.mode_count(), body.name));
         }
-        if full.geometric_stiffness.is_some() && !self.left_out.iter().any(|l| l.starts_with("geometric stiffness")) {
-            self.left_out.push("geometric stiffness (in the modal files, not used by this version)".into());
-        }
-        let (modal, integrals) = self.files.pack(&path, &full, &modes);
+        let order = inertia_order(self.source, index, body)?;
+        let geometric = self.geometric_stiffness(index, body, full.geometric_stiffness.is_some(), order)?;
+        let (modal, integrals) = self.files.pack(&path, &full, &modes, geometric);
         let damping_ratio = match &body.damping_ratio {
             None => modal.damping_ratio.clone(),
             Some(Numbers::One(z)) => vec![*z; modes.len()],
@@ -36,7 +35,7 @@ impl Assembly<'_> {
             |given: &[f64]| if self.is_overridden(body) { given.iter().copied().take(modes.len()).collect() } else { given.to_vec() };
         let definition = FlexibleDefinition {
             damping_ratio,
-            order: inertia_order(self.source, index, body)?,
+            order,
             modal_position: start(&body.modal_position),
             modal_velocity: start(&body.modal_velocity),
             mode_numbers: modes.iter().map(|m| m + 1).collect(),
@@ -45,6 +44,24 @@ impl Assembly<'_> {
         };
         self.chosen.push((index, Selection { file: handle, modes, content_sha256 }));
         Ok(BodyDefinitionKind::Flexible(definition))
+    }
+
+    /// Whether the body uses geometric stiffness; `held` tells that the file has it.
+    fn geometric_stiffness(&mut self, index: usize, body: &BodySpec, held: bool, order: InertiaOrder) -> Result<bool, SceneError> {
+        let steps = [Step::Key("body"), Step::Index(index), Step::Key("geometric_stiffness")];
+        let wanted = body.geometric_stiffness.unwrap_or(false);
+        if wanted && !held {
+            let message =
+                "true, but the modal file has no geometric stiffness; write the file with geometric/stiffness or leave the key out";
+            return Err(self.source.value(&steps, message));
+        }
+        if wanted && order < InertiaOrder::First {
+            return Err(self.source.value(&steps, "true needs inertia_order = 1 or 2; order 0 evaluates the undeformed body"));
+        }
+        if held && !wanted {
+            self.left_out.push(format!("geometric stiffness of \"{}\"", body.name));
+        }
+        Ok(wanted)
     }
 
     fn is_overridden(&self, body: &BodySpec) -> bool {

@@ -28,7 +28,7 @@ type Packed = (Arc<ModalBody>, Arc<ModalIntegrals>);
 #[derive(Debug, Default)]
 pub struct ModalFiles {
     files: HashMap<PathBuf, (Rc<ModalFile>, Rc<ModalBody>, String)>,
-    packed: HashMap<(PathBuf, Vec<usize>), Packed>,
+    packed: HashMap<(PathBuf, Vec<usize>, bool), Packed>,
 }
 
 impl ModalFiles {
@@ -45,11 +45,12 @@ impl ModalFiles {
         Ok(entry)
     }
 
-    /// The body with the modes `modes` (0-based), packed.
-    pub fn pack(&mut self, path: &Path, body: &ModalBody, modes: &[usize]) -> Packed {
-        let entry = self.packed.entry((path.to_owned(), modes.to_vec())).or_insert_with(|| {
+    /// The body with the modes `modes` (0-based), packed with or without its geometric stiffness.
+    pub fn pack(&mut self, path: &Path, body: &ModalBody, modes: &[usize], geometric: bool) -> Packed {
+        let entry = self.packed.entry((path.to_owned(), modes.to_vec(), geometric)).or_insert_with(|| {
             let selected = body.with_modes(modes);
-            let integrals = ModalIntegrals::of(&selected);
+            let pack = if geometric { ModalIntegrals::with_geometric_stiffness } else { ModalIntegrals::of };
+            let integrals = pack(&selected);
             (Arc::new(selected), Arc::new(integrals))
         });
         entry.clone()

@@ -142,6 +142,8 @@ pub struct BodySpec {
     pub damping_ratio: Option<Numbers>,
     /// 0, 1 or 2.
     pub inertia_order: Option<u8>,
+    /// Use the geometric stiffness of the modal file; not if none.
+    pub geometric_stiffness: Option<bool>,
     /// Initial modal coordinates.
     #[serde(default)]
     pub modal_position: Vec<f64>,
