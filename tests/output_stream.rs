@@ -248,6 +248,7 @@ fn report_has_the_keys_of_the_interface() -> Tested {
         "peaks",
         "final",
         "left_out",
+        "warnings",
         "exceedances",
         "files",
         "outcome",

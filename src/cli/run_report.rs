@@ -75,6 +75,9 @@ pub fn write(scene: &str, report: &RunReport, output: &mut dyn Write) -> Result<
         optional(report.errors.closure),
         optional(report.errors.local)
     )?;
+    for warning in &report.warnings {
+        writeln!(output, "warning: {warning}")?;
+    }
     writeln!(output, "left out: {}", report.left_out.join(", "))?;
     for file in &report.files {
         writeln!(output, "wrote {} {}: {} output times", file.kind, file.target, file.frames)?;

@@ -18,6 +18,7 @@ pub mod scales;
 #[cfg(feature = "hdf5")]
 pub mod scene_plan;
 pub mod set;
+pub mod stiffening;
 pub mod surface;
 pub mod tracker;
 pub mod viewer;

@@ -135,6 +135,8 @@ pub struct RunReport {
     pub end: Option<Evaluation>,
     /// What the run did not evaluate.
     pub left_out: Vec<String>,
+    /// What makes the model doubtful, in words.
+    pub warnings: Vec<String>,
     /// Stays above limits, in the order of their start.
     pub exceedances: Vec<Exceedance>,
     /// Files and streams.

@@ -115,6 +115,7 @@ impl<'s> OutputSet<'s> {
             peaks: self.tracker.peaks(self.system),
             end,
             left_out,
+            warnings: self.tracker.warnings(self.system),
             exceedances: self.tracker.exceedances().to_vec(),
             files: self.written,
             outcome: OutcomeRecord::from(&summary.outcome),

@@ -6,6 +6,7 @@ use super::frame::OutputFrame;
 use super::plan::OutputPlan;
 use super::report::{BodyPeak, ErrorFigures, Exceedance, LoadPeak, Peaks};
 use super::scales::plain;
+use super::stiffening::StiffeningGauge;
 use crate::dynamics::energy::Momentum;
 use crate::dynamics::hinge_load::hinge_load;
 use crate::integrate::Sample;
@@ -128,6 +129,7 @@ pub struct Tracker {
     span: f64,
     audit: Option<f64>,
     closure: Option<f64>,
+    stiffening: StiffeningGauge,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -189,6 +191,7 @@ impl Tracker {
             span: 0.0,
             audit: None,
             closure: None,
+            stiffening: StiffeningGauge::new(system),
         }
     }
 
@@ -204,6 +207,7 @@ impl Tracker {
                 *peak = BodyPeak { von_mises: found.value, time_s: time, node: found.node, position };
             }
         }
+        self.stiffening.follow(sample);
         self.watch_limits(time, |source| source.value(frame));
         self.events.clear();
         self.events.append(&mut self.since);
@@ -219,6 +223,7 @@ impl Tracker {
     /// Takes in the end of a step: loads peak between output times too.
     pub fn follow_step(&mut self, step: &Sample<'_>) {
         let time = step.state.time;
+        self.stiffening.follow(step);
         for (load, &k) in self.loads.iter_mut().zip(&self.loaded) {
             *load = hinge_load(step.workspace, k);
         }
@@ -278,6 +283,12 @@ impl Tracker {
         let bodies = in_order().filter_map(|b| self.bodies.iter().find(|(_, name, _)| *name == b.name));
         let bodies = bodies.map(|(_, name, peak)| (name.clone(), *peak)).collect::<Named<_>>();
         Peaks { hinges: hinges.collect(), closures: closures.collect(), bodies }
+    }
+
+    /// Where the motion asks for geometric stiffness that is not used.
+    #[must_use]
+    pub fn warnings(&self, system: &System) -> Vec<String> {
+        self.stiffening.warnings(system)
     }
 
     /// Stays above limits so far.
