@@ -57,7 +57,8 @@ fn evaluations_and_hinge_loads_allocate_nothing() {
     let boundaries = [None, Some(Boundary::Cantilever), Some(Boundary::FreeFree), Some(Boundary::General)];
     for (i, (base, _, _)) in KINDS.iter().enumerate() {
         for (j, boundary) in boundaries.into_iter().enumerate() {
-            let recipe = Recipe { bodies: 12, base: Some(base), boundary, prescribed: 0.2, ..Recipe::default() };
+            let second_order = (i % 2 == 0).then_some(0.05);
+            let recipe = Recipe { bodies: 12, base: Some(base), boundary, prescribed: 0.2, second_order, ..Recipe::default() };
             let (system, mut state) = random_tree((i * 10 + j) as u64, &recipe).build().unwrap();
             let mut workspace = Workspace::new(&system);
             let mut loads = vec![Vector6::zeros(); system.bodies.len()];

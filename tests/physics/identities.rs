@@ -21,6 +21,7 @@ fn recipes() -> Vec<Recipe> {
         Recipe { flexible: 1.0, boundary: Some(Boundary::FreeFree), ..all },
         Recipe { flexible: 1.0, boundary: Some(Boundary::General), ..all },
         Recipe { bodies: 12, ..all },
+        Recipe { flexible: 1.0, second_order: Some(0.05), ..all },
         Recipe { prescribed: 0.5, bodies: 9, ..all },
         Recipe { base: Some("free"), gravity: false, ..all },
     ]

@@ -16,5 +16,6 @@ mod nodal_sums;
 mod published;
 mod published_flexible;
 mod published_loops;
+mod rotating;
 mod scaling;
 mod stiff;

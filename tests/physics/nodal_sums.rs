@@ -1,7 +1,7 @@
 //! Inertia and velocity terms from modal integrals against sums over the nodes they were integrated from.
 
-use crate::support::lumped::{LumpedBody, lumped_body, vector};
-use nalgebra::{Matrix3, Vector3, Vector6};
+use crate::support::lumped::{LumpedBody, SecondOrder, lumped_body, vector, with_second_order};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3, Vector6};
 use pliant::dynamics::flexible_inertia::FlexibleInertia;
 use pliant::model::InertiaOrder;
 use pliant::model::flexible_body::ModalIntegrals;
@@ -71,13 +71,39 @@ fn nodal(body: &LumpedBody, motion: &Motion) -> Terms {
 }
 
 fn integrated(body: &LumpedBody, motion: &Motion, order: InertiaOrder) -> Terms {
+    integrated_of(&ModalIntegrals::of(&body.modal), motion, order)
+}
+
+fn integrated_of(integrals: &ModalIntegrals, motion: &Motion, order: InertiaOrder) -> Terms {
     let n = motion.eta.len();
-    let integrals = ModalIntegrals::of(&body.modal);
     let mut inertia = FlexibleInertia::new(n);
-    inertia.evaluate(&integrals, order, &motion.eta);
+    inertia.evaluate(integrals, order, &motion.eta);
     let mut bias_modal = vec![0.0; n];
-    let bias = inertia.velocity_terms(&integrals, order, &motion.omega, &motion.eta_dot, &mut bias_modal);
+    let bias = inertia.velocity_terms(integrals, order, &motion.omega, &motion.eta_dot, &mut bias_modal);
     Terms { first_moment: inertia.first_moment, inertia: inertia.inertia, row: inertia.row.clone(), bias, bias_modal }
+}
+
+/// Adds what the displacements `s = 1/2 eta' Gamma eta` of the nodes make with the motion of the undeformed body.
+fn add_second_order(terms: &mut Terms, body: &LumpedBody, field: &SecondOrder, motion: &Motion) {
+    let n = motion.eta.len();
+    let w = motion.omega;
+    for ((m, r), at) in body.masses.iter().zip(&body.points).zip(field) {
+        let along = |j: usize, rates: &[f64]| (0..n).map(|k| at[j + n * k] * rates[k]).sum::<Vector3<f64>>();
+        let twice = |a: &[f64], b: &[f64]| (0..n).map(|j| along(j, b) * a[j]).sum::<Vector3<f64>>();
+        let (eta, rate) = (&motion.eta, &motion.eta_dot);
+        let (s, s_dot, s_ddot) = (twice(eta, eta) * 0.5, twice(eta, rate), twice(rate, rate));
+        let frame = w.cross(&w.cross(r));
+        let force = (s_ddot + w.cross(&s_dot) * 2.0 + w.cross(&w.cross(&s))) * *m;
+        let joined = |a: Vector3<f64>, b: Vector3<f64>| Vector6::new(a.x, a.y, a.z, b.x, b.y, b.z);
+        terms.first_moment += s * *m;
+        terms.inertia += (Matrix3::from_diagonal_element(2.0 * r.dot(&s)) - r * s.transpose() - s * r.transpose()) * *m;
+        terms.bias += joined(r.cross(&force) + s.cross(&frame) * *m, force);
+        for j in 0..n {
+            let phi = along(j, eta);
+            terms.row[j] += joined(r.cross(&phi), phi) * *m;
+            terms.bias_modal[j] += phi.dot(&frame) * m;
+        }
+    }
 }
 
 fn bodies() -> impl Iterator<Item = (u64, StdRng, LumpedBody)> {
@@ -144,6 +170,75 @@ fn inertia_orders_zero_and_one_are_the_taylor_truncations() {
             let undeformed = at(0.0);
             // at eta = 0 every order is exact but for rounding, and for modal rates, which are zero here
             assert!(undeformed.iter().all(|(_, e)| *e < 1e3 * f64::EPSILON), "seed {seed}, {order:?}: {undeformed:?}");
+        }
+    }
+}
+
+#[test]
+fn geometric_stiffness_gives_the_terms_of_the_second_order_displacements_of_nodes() {
+    for (seed, mut rng, body) in bodies() {
+        let (field, modal) = with_second_order(&mut rng, &body, 0.5);
+        let integrals = ModalIntegrals::with_geometric_stiffness(&modal);
+        for size in [0.1, 1.0, 10.0] {
+            let motion = Motion::random(&mut rng, body.shapes.len(), size);
+            let found = integrated_of(&integrals, &motion, InertiaOrder::Second);
+            let mut expected = nodal(&body, &motion);
+            add_second_order(&mut expected, &body, &field, &motion);
+            for ((what, found), (_, expected)) in found.lists().into_iter().zip(expected.lists()) {
+                // as without, with the tensors taken apart into 12 matrices and put together again
+                let n = body.shapes.len() as f64;
+                let allowed = 16.0 * body.masses.len() as f64 * n * n * f64::EPSILON;
+                let error = error(&found, &expected, body.modal.mass * 1e-3);
+                assert!(error <= allowed, "seed {seed}, eta {size}: {what} differ by {error:e}, allowed {allowed:e}");
+            }
+        }
+    }
+}
+
+/// Mass matrix of (omega, v of the origin, eta_dot) at `eta`.
+fn mass(integrals: &ModalIntegrals, eta: &[f64]) -> DMatrix<f64> {
+    let n = eta.len();
+    let mut inertia = FlexibleInertia::new(n);
+    inertia.evaluate(integrals, InertiaOrder::Second, eta);
+    let mut mass = DMatrix::identity(6 + n, 6 + n);
+    mass.view_mut((0, 0), (6, 6)).copy_from(&inertia.rigid.matrix());
+    for (j, row) in inertia.row.iter().enumerate() {
+        mass.view_mut((0, 6 + j), (6, 1)).copy_from(row);
+        mass.view_mut((6 + j, 0), (1, 6)).copy_from(&row.transpose());
+    }
+    mass
+}
+
+/// Lagrange's equations in the axes of the body: `M_dot u + (omega x angular, omega x linear momentum)`, less `1/2 u' dM/d eta u`.
+#[test]
+fn velocity_terms_are_those_of_the_mass_matrix() {
+    for (seed, mut rng, body) in bodies() {
+        let (_, modal) = with_second_order(&mut rng, &body, 0.5);
+        for integrals in [ModalIntegrals::of(&modal), ModalIntegrals::with_geometric_stiffness(&modal)] {
+            let n = body.shapes.len();
+            let motion = Motion::random(&mut rng, n, 1.0);
+            let found = integrated_of(&integrals, &motion, InertiaOrder::Second);
+            let mut rates = DVector::zeros(6 + n);
+            rates.rows_mut(0, 3).copy_from(&motion.omega);
+            rates.rows_mut(6, n).copy_from_slice(&motion.eta_dot);
+            let shifted = |by: &dyn Fn(usize) -> f64| mass(&integrals, &(0..n).map(|j| motion.eta[j] + by(j)).collect::<Vec<_>>());
+            // M is of second order in eta: differences over a step of one are exact but for rounding
+            let along = |by: &dyn Fn(usize) -> f64| (shifted(by) - shifted(&|j| -by(j))) * 0.5;
+            let mut expected = along(&|j| motion.eta_dot[j]) * &rates;
+            let momentum = mass(&integrals, &motion.eta) * &rates;
+            for part in [0, 3] {
+                let turned = motion.omega.cross(&Vector3::from_iterator(momentum.rows(part, 3).iter().copied()));
+                expected.rows_mut(part, 3).iter_mut().zip(turned.iter()).for_each(|(e, t)| *e += t);
+            }
+            for k in 0..n {
+                let change = along(&|j| if j == k { 1.0 } else { 0.0 });
+                expected[6 + k] -= 0.5 * rates.dot(&(change * &rates));
+            }
+            let found = [found.bias.as_slice(), &found.bias_modal].concat();
+            // differences of masses that are up to (1 + eta)^2 of the body's, over n modes
+            let allowed = 64.0 * (6 + n) as f64 * body.masses.len() as f64 * f64::EPSILON;
+            let error = error(&found, expected.as_slice(), body.modal.mass);
+            assert!(error <= allowed, "seed {seed}: velocity terms differ by {error:e}, allowed {allowed:e}");
         }
     }
 }

@@ -100,6 +100,46 @@ pub fn lumped_body(rng: &mut StdRng, boundary: Boundary, modes: usize) -> Lumped
     LumpedBody { masses, points, shapes, modal }
 }
 
+/// Second-order displacements of the nodes: `field[node][j + modes * k]`, symmetric in the modes, at most `size`; none at the root.
+pub type SecondOrder = Vec<Vec<Vector3<f64>>>;
+
+/// Random second-order displacements of a body's nodes, and its modal data with the geometric stiffness that they make.
+pub fn with_second_order(rng: &mut StdRng, body: &LumpedBody, size: f64) -> (SecondOrder, ModalBody) {
+    let n = body.shapes.len();
+    let field: SecondOrder = (0..body.points.len())
+        .map(|node| {
+            let mut at = vec![Vector3::zeros(); n * n];
+            for j in 0..n {
+                for k in 0..=j {
+                    let value = if node == 0 { Vector3::zeros() } else { vector(rng, size) };
+                    (at[j + n * k], at[k + n * j]) = (value, value);
+                }
+            }
+            at
+        })
+        .collect();
+    // the 12 unit accelerations of the frame: linear, angular, and w x (w x r) for each product of two components of w
+    let axis = |i: usize| Vector3::ith(i, 1.0);
+    let product = |i: usize, j: usize, r: &Vector3<f64>| {
+        if i == j { axis(i) * r[i] - r } else { axis(i) * r[j] + axis(j) * r[i] }
+    };
+    let acceleration = |load: usize, r: &Vector3<f64>| match load {
+        0..3 => axis(load),
+        3..6 => axis(load - 3).cross(r),
+        6..9 => product(load - 6, load - 6, r),
+        9 => product(0, 1, r),
+        10 => product(1, 2, r),
+        _ => product(0, 2, r),
+    };
+    let matrices = (0..12).map(|load| {
+        let nodes = || body.masses.iter().zip(&body.points).zip(&field);
+        let sum = |i: usize| nodes().map(|((m, r), at)| m * acceleration(load, r).dot(&at[i])).sum::<f64>();
+        DMatrix::from_fn(n, n, |j, k| sum(j + n * k))
+    });
+    let modal = ModalBody { geometric_stiffness: Some(matrices.collect()), ..body.modal.clone() };
+    (field, modal)
+}
+
 /// A positive definite matrix that an inertia may be (triangle inequality holds).
 pub fn inertia(rng: &mut StdRng, size: f64) -> Matrix3<f64> {
     let points: Vec<_> = (0..4).map(|_| vector(rng, size)).collect();

@@ -1,6 +1,6 @@
 //! Seeded random trees: every hinge kind, branching, any share of flexible bodies of every boundary.
 
-use super::lumped::{inertia, lumped_body, stiffness, vector};
+use super::lumped::{inertia, lumped_body, stiffness, vector, with_second_order};
 use nalgebra::Vector3;
 use pliant::model::build::{
     BodyDefinition, BodyDefinitionKind, Definition, FlexibleDefinition, Frame, HingeDefinition, LoadDefinition, PointDefinition, WORLD,
@@ -44,6 +44,8 @@ pub struct Recipe {
     /// The base hinge; any kind if none.
     pub base: Option<&'static str>,
     pub order: InertiaOrder,
+    /// Geometric stiffness of every flexible body, by random second-order displacements of this size.
+    pub second_order: Option<f64>,
 }
 
 impl Default for Recipe {
@@ -59,6 +61,7 @@ impl Default for Recipe {
             gravity: true,
             base: None,
             order: InertiaOrder::Second,
+            second_order: None,
         }
     }
 }
@@ -99,12 +102,17 @@ fn rigid_kind(rng: &mut StdRng) -> BodyDefinitionKind {
 fn flexible_kind(rng: &mut StdRng, recipe: &Recipe) -> BodyDefinitionKind {
     let any = [Boundary::Cantilever, Boundary::FreeFree, Boundary::General][rng.random_range(0..3)];
     let n = rng.random_range(1..7);
-    let mut modal = lumped_body(rng, recipe.boundary.unwrap_or(any), n).modal;
+    let body = lumped_body(rng, recipe.boundary.unwrap_or(any), n);
+    let mut modal = match recipe.second_order {
+        // numbers of its own: the tree stays that of the seed
+        Some(size) => with_second_order(&mut StdRng::seed_from_u64(n as u64), &body, size).1,
+        None => body.modal,
+    };
     if rng.random_bool(0.3) {
         modal.stiffness = Some(stiffness(rng, n));
     }
     BodyDefinitionKind::Flexible(FlexibleDefinition {
-        integrals: Arc::new(ModalIntegrals::of(&modal)),
+        integrals: Arc::new(ModalIntegrals::with_geometric_stiffness(&modal)),
         modal: Arc::new(modal),
         mode_numbers: (1..=n).collect(),
         damping_ratio: vec![if recipe.dampers { 0.02 } else { 0.0 }; n],
