@@ -288,7 +288,7 @@ fn motion_that_asks_for_unused_geometric_stiffness_is_told() {
     assert!(told(stiffened("beam", stiffened_beam(1)), 1.0).is_empty());
 }
 
-/// A tumbling boom with stiffening: energy and momenta of the whole, and a beam that no step size blows up.
+/// A tumbling hub and boom with stiffening: energy and angular momentum of the whole.
 #[test]
 fn spinning_boom_on_a_free_hub_keeps_its_energy() {
     let bodies = vec![rigid("hub", 3.0, [0.1, 0.0, 0.2], [2.0, 1.5, 1.0]), stiffened("beam", stiffened_beam(4))];
