@@ -14,8 +14,8 @@ impl From<&SceneArguments> for Overrides {
             integrator: arguments.integrator.clone(),
             modes: arguments.modes,
             rigid: arguments.rigid.clone(),
-            duration: None,
             closure_method: arguments.closure_method.clone(),
+            ..Self::default()
         }
     }
 }

@@ -26,6 +26,8 @@ pub struct Overrides {
     pub duration: Option<f64>,
     /// Method for all closures.
     pub closure_method: Option<String>,
+    /// Order of the inertia in the modal coordinates, for every flexible body.
+    pub inertia_order: Option<u8>,
 }
 
 /// Limits to watch: of loads at every step and output time, of stress at every output time.
@@ -73,6 +75,8 @@ pub struct Scene {
     pub method: Method,
     /// Why this method, where the scene leaves the choice to pliant.
     pub method_reason: Option<String>,
+    /// Tolerances and bound on the step, whether the method uses them or not.
+    pub control: settings::Control,
     /// Simulated time (s), if the scene gives one.
     pub duration: Option<f64>,
     /// Output times per second.
@@ -96,6 +100,18 @@ pub struct Scene {
     pub flexible: Vec<(usize, super::modal_files::Selection)>,
     /// What the scene does not need or was told to leave out.
     pub left_out: Vec<String>,
+}
+
+impl Scene {
+    /// The integrator of that name at another accuracy than the scene's; none for a name that is not known.
+    #[must_use]
+    pub fn method_at(&self, integrator: &str, accuracy: settings::Accuracy) -> Option<Method> {
+        let (control, step) = match accuracy {
+            settings::Accuracy::Tolerance(relative) => (self.control.at(relative), None),
+            settings::Accuracy::Step(step) => (self.control, Some(step)),
+        };
+        settings::named(integrator, &control, step, &self.system, self.rate_hz).map(|(method, _)| method)
+    }
 }
 
 /// Reads and assembles the scene at `path`.
@@ -141,8 +157,9 @@ pub fn assemble(source: Source, overrides: &Overrides) -> Result<Scene, SceneErr
     if let Some(duration) = duration.filter(|d| !(*d > 0.0 && d.is_finite())) {
         return Err(source.value(&[Step::Key("simulation"), Step::Key("duration")], format!("{duration} s must be positive")));
     }
+    let control = settings::control(&spec.simulation, &source)?;
     let (method, method_reason) =
-        settings::method(&spec.simulation, overrides.integrator.as_deref(), &system, spec.output.rate_hz, &source)?;
+        settings::method(&spec.simulation, &control, overrides.integrator.as_deref(), &system, spec.output.rate_hz, &source)?;
     let hinges = match &spec.output.hinges {
         None => system.definition_order.clone(),
         Some(names) => names_to_indices(names, "hinges", "hinge", |n| system.hinge_index(n), &source)?,
@@ -171,6 +188,7 @@ pub fn assemble(source: Source, overrides: &Overrides) -> Result<Scene, SceneErr
         state,
         method,
         method_reason,
+        control,
         duration,
         rate_hz: spec.output.rate_hz,
         hinges,
@@ -205,6 +223,9 @@ fn check_overrides(spec: &SceneSpec, overrides: &Overrides) -> Result<(), SceneE
     if let Some(method) = overrides.closure_method.as_deref().filter(|m| !ClosureMethod::is_known(m)) {
         let message = format!("\"{method}\" is not a closure method; known: {}", ClosureMethod::NAMES.join(", "));
         return Err(SceneError::Override { option: "--closure-method", message });
+    }
+    if let Some(order) = overrides.inertia_order.filter(|o| *o > 2) {
+        return Err(SceneError::Override { option: "--orders", message: format!("{order} must be 0, 1 or 2") });
     }
     match overrides.rigid.iter().find(|name| !flexible.contains(&name.as_str())) {
         None => Ok(()),

@@ -19,7 +19,7 @@ impl Assembly<'_> {
         if modes.len() < full.mode_count() {
             self.left_out.push(format!("{} of {} modes of \"{}\"", full.mode_count() - modes.len(), full.mode_count(), body.name));
         }
-        let order = inertia_order(self.source, index, body)?;
+        let order = inertia_order(self, index, body)?;
         let geometric = self.geometric_stiffness(index, body, full.geometric_stiffness.is_some(), order)?;
         let (modal, integrals) = self.files.pack(&path, &full, &modes, geometric);
         let damping_ratio = match &body.damping_ratio {
@@ -31,8 +31,14 @@ impl Assembly<'_> {
             }
             Some(Numbers::Many(list)) => list.clone(),
         };
-        let start =
-            |given: &[f64]| if self.is_overridden(body) { given.iter().copied().take(modes.len()).collect() } else { given.to_vec() };
+        let start = |given: &[f64]| {
+            let mut start = given.to_vec();
+            // modes that an override adds start at rest
+            if self.is_overridden(body) && !start.is_empty() {
+                start.resize(modes.len(), 0.0);
+            }
+            start
+        };
         let definition = FlexibleDefinition {
             damping_ratio,
             order,
@@ -54,6 +60,11 @@ impl Assembly<'_> {
             let message =
                 "true, but the modal file has no geometric stiffness; write the file with geometric/stiffness or leave the key out";
             return Err(self.source.value(&steps, message));
+        }
+        if wanted && order < InertiaOrder::First && self.overrides.inertia_order.is_some() {
+            // the override says what it leaves out
+            self.left_out.push(format!("geometric stiffness of \"{}\"", body.name));
+            return Ok(false);
         }
         if wanted && order < InertiaOrder::First {
             return Err(self.source.value(&steps, "true needs inertia_order = 1 or 2; order 0 evaluates the undeformed body"));
@@ -122,8 +133,9 @@ fn retained(assembly: &Assembly<'_>, index: usize, body: &BodySpec, frequency_hz
     }
 }
 
-fn inertia_order(source: &Source, index: usize, body: &BodySpec) -> Result<InertiaOrder, SceneError> {
-    match body.inertia_order {
+fn inertia_order(assembly: &Assembly<'_>, index: usize, body: &BodySpec) -> Result<InertiaOrder, SceneError> {
+    let source = assembly.source;
+    match assembly.overrides.inertia_order.or(body.inertia_order) {
         Some(0) => Ok(InertiaOrder::Zeroth),
         Some(1) => Ok(InertiaOrder::First),
         Some(2) | None => Ok(InertiaOrder::Second),

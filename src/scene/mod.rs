@@ -14,3 +14,4 @@ pub mod spec;
 
 pub use assemble::{Monitor, Overrides, Scene};
 pub use error::SceneError;
+pub use settings::Accuracy;

@@ -24,17 +24,38 @@ pub const INTEGRATORS: [(&str, &str); 4] = [
 /// Share of the stable step that a fixed step takes when the scene gives none.
 const DEFAULT_SHARE: f64 = 0.25;
 
-/// The method that a scene asks for, and why where pliant chose.
+/// What error-controlled integrators are held to.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Control {
+    /// Of the local error.
+    pub tolerance: Tolerance,
+    /// s.
+    pub largest_step: f64,
+}
+
+impl Control {
+    /// The same at another relative tolerance; the absolute one keeps its ratio to it.
+    #[must_use]
+    pub fn at(&self, relative: f64) -> Self {
+        let absolute = self.tolerance.absolute * (relative / self.tolerance.relative);
+        Self { tolerance: Tolerance { relative, absolute }, ..*self }
+    }
+}
+
+/// How closely an integrator shall follow the motion.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Accuracy {
+    /// Relative tolerance of an error-controlled integrator.
+    Tolerance(f64),
+    /// Step of rk4 (s).
+    Step(f64),
+}
+
+/// The tolerances and the bound on the step that a scene asks for.
 ///
 /// # Errors
-/// If the name is unknown, or a step or tolerance cannot be.
-pub fn method(
-    spec: &SimulationSpec,
-    name: Option<&str>,
-    system: &System,
-    rate_hz: f64,
-    source: &Source,
-) -> Result<(Method, Option<String>), SceneError> {
+/// If one of them cannot be.
+pub fn control(spec: &SimulationSpec, source: &Source) -> Result<Control, SceneError> {
     let at = |key| [Step::Key("simulation"), Step::Key(key)];
     for (key, value) in [("step", spec.step), ("largest_step", spec.largest_step)] {
         if let Some(value) = value.filter(|v| !(*v > 0.0)) {
@@ -47,24 +68,45 @@ pub fn method(
         }
     }
     let tolerance = Tolerance { relative: spec.relative_tolerance, absolute: spec.absolute_tolerance };
-    let largest_step = spec.largest_step.unwrap_or(f64::INFINITY);
-    match name.or(spec.integrator.as_deref()).unwrap_or("auto") {
+    Ok(Control { tolerance, largest_step: spec.largest_step.unwrap_or(f64::INFINITY) })
+}
+
+/// The method that a scene asks for, and why where pliant chose.
+///
+/// # Errors
+/// If the name is unknown.
+pub fn method(
+    spec: &SimulationSpec,
+    control: &Control,
+    name: Option<&str>,
+    system: &System,
+    rate_hz: f64,
+    source: &Source,
+) -> Result<(Method, Option<String>), SceneError> {
+    let asked = name.or(spec.integrator.as_deref()).unwrap_or("auto");
+    named(asked, control, spec.step, system, rate_hz).ok_or_else(|| {
+        let known = INTEGRATORS.map(|i| i.0).join(", ");
+        refused(name, format!("\"{asked}\" is not an integrator; known: {known}"), source)
+    })
+}
+
+/// The method of that name, and why where pliant chose; none for a name that is not known. `step` is of rk4.
+#[must_use]
+pub fn named(name: &str, control: &Control, step: Option<f64>, system: &System, rate_hz: f64) -> Option<(Method, Option<String>)> {
+    let Control { tolerance, largest_step } = *control;
+    match name {
         "auto" => {
             let choice = choose(system, tolerance, largest_step, rate_hz);
-            Ok((choice.method, Some(choice.reason)))
+            Some((choice.method, Some(choice.reason)))
         }
-        "dormand_prince" => Ok((Method::DormandPrince { tolerance, largest_step }, None)),
-        "rosenbrock_w" => Ok((Method::RosenbrockW { tolerance, largest_step }, None)),
+        "dormand_prince" => Some((Method::DormandPrince { tolerance, largest_step }, None)),
+        "rosenbrock_w" => Some((Method::RosenbrockW { tolerance, largest_step }, None)),
         "rk4" => {
             let stable = fastest_mode(system).map(|m| stable_step(&tableau::RK4, m.frequency_hz, m.damping_ratio));
-            let step = spec.step.unwrap_or_else(|| stable.map_or(f64::INFINITY, |h| DEFAULT_SHARE * h).min(1.0 / rate_hz));
-            Ok((Method::RungeKutta4 { step }, None))
+            let step = step.unwrap_or_else(|| stable.map_or(f64::INFINITY, |h| DEFAULT_SHARE * h).min(1.0 / rate_hz));
+            Some((Method::RungeKutta4 { step }, None))
         }
-        other => {
-            let known = INTEGRATORS.map(|i| i.0).join(", ");
-            let message = format!("\"{other}\" is not an integrator; known: {known}");
-            Err(refused(name, message, source))
-        }
+        _ => None,
     }
 }
 
