@@ -15,6 +15,7 @@
 //! - `io`: modal files and results files (feature `hdf5`);
 //! - [`scene`]: scene files to systems and settings;
 //! - [`output`]: observers that keep peaks and limits, write results and stream to the viewer (feature `rerun`);
+//! - [`study`]: error against run time over settings of one scene;
 //! - [`cli`]: the program.
 //!
 //! # One evaluation
@@ -60,3 +61,4 @@ pub mod model;
 pub mod output;
 pub mod scene;
 pub mod spatial;
+pub mod study;

@@ -4,10 +4,11 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Layers in order; a file may use its own and those before it.
-const LAYERS: [&str; 8] = ["spatial", "model", "dynamics", "integrate", "io", "scene", "output", "cli"];
+const LAYERS: [&str; 9] = ["spatial", "model", "dynamics", "integrate", "io", "scene", "output", "study", "cli"];
 
 /// Foreign crates that only some places may use.
-const CONFINED: [(&str, &[&str]); 7] = [
+const CONFINED: [(&str, &[&str]); 8] = [
+    ("plotters", &["src/study/plot.rs"]),
     ("hdf5::", &["src/io/"]),
     ("rerun::", &["src/output/rerun.rs"]),
     ("clap", &["src/cli/"]),

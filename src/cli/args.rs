@@ -20,6 +20,8 @@ pub enum Command {
     Run(RunArguments),
     /// Evaluate a scene once, at its initial state: accelerations, hinge loads, energies
     Eval(EvalArguments),
+    /// Run a scene over integrators, tolerances or steps, mode counts, inertia orders: error of every load against run time
+    Study(StudyArguments),
     /// Check scenes and modal files; a modal file gets its health report, one row per rule
     Check(CheckArguments),
     /// Show the modes of a modal file: frequencies, effective masses, participation, interfaces, rules
@@ -84,6 +86,66 @@ pub struct EvalArguments {
     /// Print one JSON object instead of tables; every number reads back to the same f64
     #[arg(long)]
     pub json: bool,
+}
+
+/// Arguments of `pliant study`.
+#[derive(Debug, Args)]
+#[command(help_expected = true)]
+pub struct StudyArguments {
+    /// The scene (.toml)
+    #[arg(value_name = "SCENE")]
+    pub scene: PathBuf,
+    /// Integrators to run [default: all that finish in a million steps]
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
+    pub integrators: Vec<String>,
+    /// Relative tolerances of the error-controlled ones; the absolute one follows [default: 1e-3 to 1e-8]
+    #[arg(long, value_name = "X,...", value_delimiter = ',', allow_negative_numbers = true)]
+    pub tolerances: Vec<f64>,
+    /// Steps of rk4 (s) [default: half of what is stable, halved five times]
+    #[arg(long, value_name = "S,...", value_delimiter = ',', allow_negative_numbers = true)]
+    pub steps: Vec<f64>,
+    /// Lowest modes to retain of every flexible body [default: those of the scene]
+    #[arg(long, value_name = "N,...", value_delimiter = ',')]
+    pub modes: Vec<usize>,
+    /// Orders of the inertia in the modal coordinates: 0, 1, 2 [default: those of the scene]
+    #[arg(long, value_name = "N,...", value_delimiter = ',')]
+    pub orders: Vec<u8>,
+    /// Methods for all closures [default: those of the scene]
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
+    pub closure_method: Vec<String>,
+    /// Simulated time (s) instead of the scene's
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    pub duration: Option<f64>,
+    /// Results file to compare with [default: a run with all modes, a hundred times tighter than the tightest tolerance]
+    #[arg(long, value_name = "FILE.h5")]
+    pub reference: Option<PathBuf>,
+    /// Error budget: largest peak error of a load, as 1% or 0.01
+    #[arg(long, value_name = "X", default_value = "1%", value_parser = budget, allow_negative_numbers = true)]
+    pub error: f64,
+    /// Rounds; each runs every setting once, in another order
+    #[arg(long, value_name = "N", default_value_t = 3)]
+    pub repeat: usize,
+    /// Keep finished runs in this file (JSON lines), and take from it what is there
+    #[arg(long, value_name = "FILE")]
+    pub state: Option<PathBuf>,
+    /// Write every channel of every setting to this table
+    #[arg(long, value_name = "FILE")]
+    pub csv: Option<PathBuf>,
+    /// Draw error against run time to this picture
+    #[arg(long, value_name = "FILE")]
+    pub svg: Option<PathBuf>,
+    /// Print one JSON object instead of tables
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// "1%" or "0.01".
+fn budget(text: &str) -> Result<f64, String> {
+    let (number, unit) = text.strip_suffix('%').map_or((text, 1.0), |n| (n.trim_end(), 0.01));
+    match number.parse::<f64>() {
+        Ok(x) if x > 0.0 && x.is_finite() => Ok(unit * x),
+        _ => Err("write a positive share, as 1% or 0.01".to_owned()),
+    }
 }
 
 /// Where the picture goes.

@@ -13,6 +13,7 @@ mod modes;
 mod report;
 mod run;
 mod run_report;
+mod study;
 
 use args::{Arguments, Command};
 use clap::{CommandFactory, Parser};
@@ -48,6 +49,7 @@ fn run(arguments: Arguments, output: &mut dyn Write) -> Result<(), Failure> {
         None => Ok(write!(output, "{}", Arguments::command().render_help())?),
         Some(Command::Run(arguments)) => run::run(&arguments, output),
         Some(Command::Eval(arguments)) => eval::run(&arguments, output),
+        Some(Command::Study(arguments)) => study::run(&arguments, output),
         Some(Command::Check(arguments)) => check::run(&arguments, output),
         #[cfg(feature = "hdf5")]
         Some(Command::Modes(arguments)) => modes::run(&arguments, output),

@@ -3,6 +3,8 @@
 //! Every series is a dataset with one row per output time. Rows are kept in memory and appended in blocks; after each block the file
 //! is flushed, so that a run that is killed leaves a readable file with all but the last rows. Texts are of fixed length.
 
+use super::error::ModalFileError;
+use super::guard::GuardedFile;
 use hdf5::types::{FixedUnicode, TypeDescriptor};
 use hdf5::{Dataset, Extent, Group, Location, SimpleExtents};
 use std::path::{Path, PathBuf};
@@ -35,6 +37,12 @@ pub enum ResultsError {
         /// Rows that are in the file.
         rows: u64,
         /// What the system says.
+        cause: String,
+    },
+    /// The file cannot be read.
+    #[error("{cause}; name a file that pliant run --out has written for this scene")]
+    Read {
+        /// What is wrong.
         cause: String,
     },
 }
@@ -198,6 +206,31 @@ impl ResultsFile {
         ended().map_err(|e| self.failed(&e))?;
         Ok(self.rows())
     }
+}
+
+/// Reads series by path and width, each in C order, all of them finite and with one row per output time.
+///
+/// # Errors
+/// If the file cannot be opened, or a series is not there, has another width or numbers that are not finite.
+pub fn read_series(path: &Path, wanted: &[(String, Option<usize>)]) -> Result<Vec<Vec<f64>>, ResultsError> {
+    let fail = |error: ModalFileError| ResultsError::Read {
+        cause: match error {
+            ModalFileError::Open { cause, .. } => format!("cannot be opened: {cause}"),
+            ModalFileError::Missing { object, .. } => format!("{object} is not in it"),
+            ModalFileError::WrongShape { object, found, expected, .. } => format!("{object} has the shape {found}, not {expected}"),
+            other => other.to_string(),
+        },
+    };
+    let file = GuardedFile::open(path).map_err(fail)?;
+    let mut rows = None;
+    let mut read = |(name, width): &(String, Option<usize>)| {
+        let mut shape = vec![rows];
+        shape.extend(width.map(Some));
+        let dataset = file.dataset(name)?.expect_shape(&shape, "one row per output time")?;
+        rows = Some(dataset.shape[0]);
+        dataset.read_f64()
+    };
+    wanted.iter().map(|w| read(w).map_err(fail)).collect()
 }
 
 fn write_preface(file: &hdf5::File, preface: &Preface) -> hdf5::Result<()> {

@@ -1,7 +1,7 @@
 //! Flexible bodies of a scene: modal file, retained modes, damping, and mesh nodes that carry loads.
 
 use super::assemble::Assembly;
-use super::error::{SceneError, Source};
+use super::error::SceneError;
 use super::locate::Step;
 use super::modal_files::Selection;
 use super::spec::{BodySpec, ModesRule, ModesSpec, Numbers};
