@@ -49,8 +49,7 @@ fn quick(more: &[&str]) -> Value {
 #[test]
 fn errors_fall_with_the_tolerance_and_the_step() {
     for scene in [pendulum(), four_bar()] {
-        let report =
-            study(&[&scene, "--duration", "1", "--repeat", "1", "--tolerances", "1e-3,1e-5,1e-7", "--steps", "0.02,0.01,0.005"]);
+        let report = study(&[&scene, "--duration", "1", "--repeat", "1", "--tolerances", "1e-3,1e-5,1e-7", "--steps", "0.02,0.01,0.005"]);
         for integrator in ["dormand_prince", "rosenbrock_w", "rk4"] {
             let errors = errors(&report, integrator);
             assert_eq!(errors.len(), 3);
@@ -201,9 +200,15 @@ fn finished_runs_are_taken_from_the_state_file() {
     assert_eq!(lines_of(&path), lines, "finished runs were run again");
     assert_eq!((&again["points"], &again["reference"]), (&first["points"], &first["reference"]));
     assert!(again["notes"].to_string().contains("12 of 12 runs are from the state file"), "{}", again["notes"]);
-    // another round and another tolerance run what is missing only
-    quick(&[&state[..], &["--integrators", "rk4"]].concat());
-    assert_eq!(lines_of(&path).len(), 13 + 1, "the reference is another one without tolerances");
+    // another round runs what is missing only; another tightest tolerance has another reference, to which nothing fits
+    let scene = pendulum();
+    let more = |repeat, tolerances| {
+        let lists = ["--duration", "0.5", "--repeat", repeat, "--tolerances", tolerances, "--steps", "0.02,0.01"];
+        study(&[&[scene.as_str()], &lists[..], &state[..]].concat());
+        lines_of(&path).len()
+    };
+    assert_eq!(more("3", "1e-3,1e-5"), 13 + 6);
+    assert_eq!(more("1", "1e-3,1e-6"), 19 + 7);
 }
 
 #[test]
@@ -220,7 +225,19 @@ fn a_state_file_whose_last_line_was_cut_short_goes_on() {
     assert_eq!(lines.len(), 14);
     assert_eq!(lines.iter().filter(|l| serde_json::from_str::<Value>(l).is_err()).count(), 1);
     // another scene shares the file, not the runs
-    study(&[&four_bar(), "--duration", "0.1", "--repeat", "1", "--tolerances", "1e-4", "--integrators", "dormand_prince", state[0], state[1]]);
+    study(&[
+        &four_bar(),
+        "--duration",
+        "0.1",
+        "--repeat",
+        "1",
+        "--tolerances",
+        "1e-4",
+        "--integrators",
+        "dormand_prince",
+        state[0],
+        state[1],
+    ]);
     assert_eq!(lines_of(&path).len(), 16);
 }
 
@@ -241,7 +258,8 @@ fn ctrl_c_keeps_what_was_finished_and_says_so() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("state.jsonl");
     let scene = pendulum();
-    let arguments = ["study", &scene, "--duration", "2", "--repeat", "1000000", "--tolerances", "1e-3,1e-4", "--integrators", "dormand_prince"];
+    let arguments =
+        ["study", &scene, "--duration", "2", "--repeat", "1000000", "--tolerances", "1e-3,1e-4", "--integrators", "dormand_prince"];
     let mut command = Command::new(env!("CARGO_BIN_EXE_pliant"));
     let command = command.args(arguments).args(["--state", path.to_str().unwrap()]);
     let child = command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
@@ -312,9 +330,12 @@ fn verify_prints_the_true_differences() {
     };
     let tight = run(&[]);
     let verify = &tight["verify"];
-    assert_eq!(verify["relative_tolerance"].as_f64().unwrap(), 1e-13);
+    assert!((verify["relative_tolerance"].as_f64().unwrap() / 1e-13 - 1.0).abs() < 1e-9);
+    let history = verify["hinges"]["shoulder"]["force_history"]["peak"].as_f64().unwrap();
+    assert!(history < 1e-9, "{verify}");
+    // peaks are taken where steps happen to end, some 1e-3 of a period from the top
     let force = verify["hinges"]["shoulder"]["force"].as_f64().unwrap();
-    assert!(force < 1e-9, "{verify}");
+    assert!(force < 1e-4, "{verify}");
     // the pins carry no moment, so that no difference is relative to anything
     assert!(verify["hinges"]["shoulder"]["moment"].is_null());
     let coarse = run(&["--integrator", "rk4", "--duration", "1"]);
@@ -322,6 +343,7 @@ fn verify_prints_the_true_differences() {
     assert!((verify["step"].as_f64().unwrap() - 0.5 / 60.0).abs() < 1e-15);
     let moved = verify["hinges"]["elbow"]["position"].as_f64().unwrap();
     assert!(moved > 1e-9 && moved < 1e-2, "{verify}");
+    assert!(verify["hinges"]["elbow"]["force_history"]["rms"].as_f64().unwrap() > 1e-10);
     let done = pliant(&["run", &scene, "--viewer", "none", "--verify", "--duration", "0.2"]);
     assert!(text(&done.stdout).contains("verified with a relative tolerance of 1e-13"), "{}", text(&done.stdout));
 }
@@ -337,7 +359,7 @@ mod flexible {
     #[test]
     fn fewer_modes_and_lower_orders_have_their_error_and_are_proposed() {
         let lists = ["--modes", "3,6", "--orders", "0,2", "--tolerances", "1e-4,1e-6", "--integrators", "rosenbrock_w"];
-        let report = study(&[&[hub().as_str()], &["--duration", "4", "--repeat", "1", "--error", "50%"], &lists[..]].concat());
+        let report = study(&[&[hub().as_str(), "--duration", "4", "--repeat", "1", "--error", "50%"], &lists[..]].concat());
         let points = report["points"].as_array().unwrap();
         assert_eq!(points.len(), 8);
         let error = |modes: u64, order: u64| {
@@ -363,7 +385,7 @@ mod flexible {
         assert_eq!(done.status.code(), Some(0), "{}", text(&done.stderr));
         let (own, given) = (quick(&[]), quick(&["--reference", &out]));
         let (own, given) = (errors(&own, "dormand_prince"), errors(&given, "dormand_prince"));
-        assert!(own.iter().zip(&given).all(|(a, b)| (a / b - 1.0).abs() < 1e-3), "{own:?} {given:?}");
+        assert!(own.iter().zip(&given).all(|(a, b)| (a / b - 1.0).abs() < 0.05), "{own:?} {given:?}");
         let other = pliant(&["study", &four_bar(), "--reference", &out]);
         assert_eq!(other.status.code(), Some(2));
         assert!(text(&other.stderr).contains("hinges/crank_foot/load_moment is not in it"), "{}", text(&other.stderr));

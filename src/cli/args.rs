@@ -120,7 +120,7 @@ pub struct StudyArguments {
     #[arg(long, value_name = "FILE.h5")]
     pub reference: Option<PathBuf>,
     /// Error budget: largest peak error of a load, as 1% or 0.01
-    #[arg(long, value_name = "X", default_value = "1%", value_parser = budget, allow_negative_numbers = true)]
+    #[arg(long, value_name = "X", default_value = "1%", value_parser = budget, allow_hyphen_values = true)]
     pub error: f64,
     /// Rounds; each runs every setting once, in another order
     #[arg(long, value_name = "N", default_value_t = 3)]
@@ -188,6 +188,9 @@ pub struct RunArguments {
     /// Simulated time (s) instead of the scene's
     #[arg(long, value_name = "S")]
     pub duration: Option<f64>,
+    /// Run again at a tenth of the tolerances (rk4: half the step) and print the true differences of loads and final positions
+    #[arg(long)]
+    pub verify: bool,
     /// Changes to the scene
     #[command(flatten)]
     pub overrides: SceneArguments,

@@ -10,8 +10,10 @@ use crate::integrate::stability::fastest_mode;
 use crate::integrate::{Flow, Observer, Outcome, Sample, Settings, simulate};
 use crate::model::aggregate::{LARGE_LOOP, MANY_LOOPS};
 use crate::model::{ClosureMethod, System};
-use crate::output::{OutputPlan, OutputSet};
+use crate::output::{OutputPlan, OutputSet, RunReport};
 use crate::scene::{Overrides, Scene, SceneError, assemble};
+use crate::study::verify::{Verification, VerifiedReport, tighter};
+use crate::study::{History, Recorder};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::Write;
 use std::path::Path;
@@ -53,6 +55,7 @@ pub fn run(arguments: &RunArguments, output: &mut dyn Write) -> Result<(), Failu
     let not_unique = not_unique(&scene)?;
 
     let plan = plan(&scene, viewer != Viewer::None)?;
+    let plan_of_loads = loads_only(&plan);
     let mut outputs = OutputSet::new(&scene.system, plan).map_err(|e| Failure::input(with_causes(&e)))?;
     // a viewer that cannot be reached must not cost the results of an earlier run
     open_viewer(arguments, viewer, &scene, &mut outputs)?;
@@ -65,16 +68,29 @@ pub fn run(arguments: &RunArguments, output: &mut dyn Write) -> Result<(), Failu
 
     let mut progress = Progress::new(&settings);
     let started = Instant::now();
-    let summary = simulate(&scene.system, &scene.state, &settings, &mut [&mut outputs, &mut progress]);
+    let mut recorder = arguments.verify.then(|| Recorder::new(&scene, None));
+    let mut observers: Vec<&mut dyn Observer> = vec![&mut outputs, &mut progress];
+    observers.extend(recorder.as_mut().map(|r| r as &mut dyn Observer));
+    let summary = simulate(&scene.system, &scene.state, &settings, &mut observers);
     let wall = started.elapsed();
     progress.bar.finish_and_clear();
     let report = outputs.finish(&summary, scene.method.name(), wall, left_out);
+    let verification = match &recorder {
+        Some(recorder) if summary.outcome == Outcome::Completed => {
+            Some(verify(&scene, &settings, plan_of_loads, &report, &recorder.history, &mut progress)?)
+        }
+        _ => None,
+    };
 
     if arguments.json {
-        let text = serde_json::to_string_pretty(&report).map_err(|e| Failure::Output(e.into()))?;
+        let whole = VerifiedReport { report: &report, verify: verification.as_ref() };
+        let text = serde_json::to_string_pretty(&whole).map_err(|e| Failure::Output(e.into()))?;
         writeln!(output, "{text}")?;
     } else {
         run_report::write(&scene.name, &report, output)?;
+        if let Some(verification) = &verification {
+            run_report::write_verification(verification, output)?;
+        }
     }
     output.flush()?;
     #[cfg(feature = "rerun")]
@@ -88,9 +104,39 @@ pub fn run(arguments: &RunArguments, output: &mut dyn Write) -> Result<(), Failu
         }
         Outcome::Completed => {}
     }
+    if let Some(failure) = verification.and_then(|v| v.failure) {
+        return Err(Failure::Stopped(format!("the run is complete, but its verification stopped early: {failure}")));
+    }
     let problems: Vec<_> =
         report.files.iter().filter_map(|f| f.problem.as_ref().map(|p| format!("{} {}: {p}", f.kind, f.target))).collect();
     if problems.is_empty() { Ok(()) } else { Err(Failure::Stopped(problems.join("\nerror: "))) }
+}
+
+/// The loads of a plan without what its other outputs cost.
+fn loads_only(plan: &OutputPlan) -> OutputPlan {
+    OutputPlan { hinges: plan.loaded_hinges(), closures: plan.loaded_closures(), ..OutputPlan::default() }
+}
+
+/// Runs the scene again, tighter, and compares.
+fn verify(
+    scene: &Scene,
+    settings: &Settings,
+    plan: OutputPlan,
+    report: &RunReport,
+    history: &History,
+    progress: &mut Progress,
+) -> Result<Verification, Failure> {
+    let settings = Settings { method: tighter(settings.method), ..*settings };
+    let mut outputs = OutputSet::new(&scene.system, plan).map_err(|e| Failure::input(with_causes(&e)))?;
+    let mut recorder = Recorder::new(scene, None);
+    progress.bar = bar(&settings);
+    progress.verifying = true;
+    let started = Instant::now();
+    let summary = simulate(&scene.system, &scene.state, &settings, &mut [&mut outputs, &mut recorder, progress]);
+    let wall = started.elapsed();
+    progress.bar.finish_and_clear();
+    let tight = outputs.finish(&summary, settings.method.name(), wall, Vec::new());
+    Ok(Verification::of(&scene.system, settings.method, [report, &tight], [history, &recorder.history]))
 }
 
 /// Most output times of a run; each is held against the limits, written and drawn.
@@ -287,6 +333,7 @@ fn closure_methods(system: &System) -> Option<String> {
 /// Progress bar and Ctrl-C.
 struct Progress {
     bar: ProgressBar,
+    verifying: bool,
     interrupted: Arc<AtomicBool>,
 }
 
@@ -295,15 +342,11 @@ const TICKS: f64 = 1000.0;
 
 impl Progress {
     fn new(settings: &Settings) -> Self {
-        let bar = ProgressBar::new((settings.duration * TICKS) as u64);
-        if let Ok(style) = ProgressStyle::with_template("{wide_bar} {percent} %  {msg}  eta {eta}") {
-            bar.set_style(style);
-        }
         let interrupted = Arc::new(AtomicBool::new(false));
         let flag = Arc::clone(&interrupted);
         // without a handler Ctrl-C ends the process at once, which loses only what is not yet on disk
         let _ = ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed));
-        Self { bar, interrupted }
+        Self { bar: bar(settings), verifying: false, interrupted }
     }
 }
 
@@ -314,11 +357,20 @@ impl Progress {
     }
 }
 
+fn bar(settings: &Settings) -> ProgressBar {
+    let bar = ProgressBar::new((settings.duration * TICKS) as u64);
+    if let Ok(style) = ProgressStyle::with_template("{wide_bar} {percent} %  {msg}  eta {eta}") {
+        bar.set_style(style);
+    }
+    bar
+}
+
 impl Observer for Progress {
     fn observe(&mut self, sample: &Sample<'_>) -> Flow {
         self.bar.set_position((sample.state.time * TICKS) as u64);
         if sample.steps.is_multiple_of(64) {
-            self.bar.set_message(format!("t = {} s, {} steps", number(sample.state.time), sample.steps));
+            let what = if self.verifying { "verification: " } else { "" };
+            self.bar.set_message(format!("{what}t = {} s, {} steps", number(sample.state.time), sample.steps));
         }
         self.asked()
     }

@@ -5,6 +5,7 @@ use super::report::{Align, Table, number};
 use crate::output::RunReport;
 use crate::output::evaluation::Named;
 use crate::output::report::LoadPeak;
+use crate::study::verify::{LoadDifference, Verification};
 use std::io::Write;
 
 /// Writes the report.
@@ -83,6 +84,35 @@ pub fn write(scene: &str, report: &RunReport, output: &mut dyn Write) -> Result<
         writeln!(output, "wrote {} {}: {} output times", file.kind, file.target, file.frames)?;
     }
     Ok(())
+}
+
+/// Writes the differences from the tighter run.
+pub fn write_verification(verification: &Verification, output: &mut dyn Write) -> Result<(), Failure> {
+    let how = match (verification.relative_tolerance, verification.step) {
+        (Some(tolerance), _) => format!("a relative tolerance of {tolerance:.3e}").replace(".000e", "e"),
+        (None, step) => format!("steps of {} s", number(step.unwrap_or(f64::NAN))),
+    };
+    if let Some(failure) = &verification.failure {
+        return Ok(writeln!(output, "\nnot verified: the run with {how} stopped early: {failure}")?);
+    }
+    writeln!(output, "\nverified with {how} in {:.2} s; differences of loads, relative, and of final positions:", verification.wall_s)?;
+    let right = Align::Right;
+    let mut table = Table::new(&[
+        ("hinge or closure", Align::Left),
+        ("peak moment", right),
+        ("moment over time", right),
+        ("peak force", right),
+        ("force over time", right),
+        ("position (m or rad)", right),
+    ]);
+    let optional = |x: Option<f64>| x.map_or_else(|| "-".to_owned(), |x| format!("{x:.1e}"));
+    let mut row = |name: &str, d: &LoadDifference, position: Option<f64>| {
+        let [moment, force] = [d.moment_history, d.force_history].map(|e| e.map(|e| e.peak));
+        table.row(std::iter::once(name.to_owned()).chain([d.moment, moment, d.force, force, position].map(optional)));
+    };
+    verification.hinges.iter().for_each(|(name, d)| row(name, &d.load, d.position));
+    verification.closures.iter().for_each(|(name, d)| row(name, d, None));
+    Ok(table.write(output)?)
 }
 
 /// Peaks of moments and forces; `of` is what carries them.

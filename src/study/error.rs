@@ -46,7 +46,7 @@ pub enum Gap {
 }
 
 /// Share of the largest load of its kind below which a channel is silent: what it holds is rounding.
-const SILENT: f64 = 1e-9;
+pub(super) const SILENT: f64 = 1e-9;
 
 /// What each channel's errors are relative to, its largest magnitude; none for a channel in which nothing happens.
 ///
@@ -80,9 +80,7 @@ pub fn compare(reference: &History, run: &History) -> Result<Vec<Option<ChannelE
     for (index, scale) in scales(reference).into_iter().enumerate() {
         let width = run.channels[index].width;
         let (mut peak, mut sum) = (0.0_f64, 0.0);
-        for (row, (found, expected)) in
-            run.values[index].chunks_exact(width).zip(reference.values[index].chunks_exact(width)).enumerate()
-        {
+        for (row, (found, expected)) in run.values[index].chunks_exact(width).zip(reference.values[index].chunks_exact(width)).enumerate() {
             let difference = found.iter().zip(expected).map(|(f, e)| (f - e) * (f - e)).sum::<f64>().sqrt();
             let relative = difference / scale.unwrap_or(1.0);
             if !(relative * relative).is_finite() {

@@ -76,11 +76,8 @@ impl Variant {
     /// What is changed, in words; empty if nothing is.
     #[must_use]
     pub fn words(&self) -> String {
-        let words = [
-            self.modes.map(|n| format!("{n} modes")),
-            self.inertia_order.map(|o| format!("order {o}")),
-            self.closure_method.clone(),
-        ];
+        let words =
+            [self.modes.map(|n| format!("{n} modes")), self.inertia_order.map(|o| format!("order {o}")), self.closure_method.clone()];
         words.into_iter().flatten().collect::<Vec<_>>().join(", ")
     }
 }
@@ -218,7 +215,8 @@ impl Grid {
         let given = integrator == "rk4" && !request.steps.is_empty();
         if steps > MOST_STEPS && !named && !given {
             let what = if variant.words().is_empty() { String::new() } else { format!(" with {}", variant.words()) };
-            let note = format!("{integrator}{what} is left out: stability would ask for {steps:.1e} steps; name it in --integrators to run it");
+            let note =
+                format!("{integrator}{what} is left out: stability would ask for {steps:.1e} steps; name it in --integrators to run it");
             self.notes.push(note);
             return;
         }

@@ -65,8 +65,13 @@ impl History {
 /// Hinges first, then closures; moment before force.
 fn channels(system: &System, hinges: &[usize], closures: &[usize]) -> Vec<Channel> {
     let joint = |group, owner: &str| {
-        [("load_moment", Kind::Moment), ("load_force", Kind::Force)]
-            .map(|(quantity, kind)| Channel { group, owner: owner.to_owned(), quantity, kind, width: 3 })
+        [("load_moment", Kind::Moment), ("load_force", Kind::Force)].map(|(quantity, kind)| Channel {
+            group,
+            owner: owner.to_owned(),
+            quantity,
+            kind,
+            width: 3,
+        })
     };
     let mut channels: Vec<_> = hinges.iter().flat_map(|&k| joint("hinges", &system.bodies[k].hinge.name)).collect();
     for &index in closures {

@@ -2,7 +2,8 @@
 //!
 //! [`grid`] says what is run, [`history`] records what is compared, [`reference`] what it is compared with, [`error`] how far off it
 //! is. [`runner`] runs everything in rounds and keeps finished runs in a [`state`] file; [`report`] draws up what was found, with the
-//! [`pareto`] front and the cheapest setting for a budget, and [`plot`] draws it. Nothing here prints.
+//! [`pareto`] front and the cheapest setting for a budget, and [`plot`] draws it. [`verify`] compares one run
+//! with a tighter one. Nothing here prints.
 
 pub mod error;
 pub mod grid;
@@ -13,6 +14,7 @@ pub mod reference;
 pub mod report;
 pub mod runner;
 pub mod state;
+pub mod verify;
 
 pub use error::{ChannelError, Gap};
 pub use grid::{Grid, Point, Request};

@@ -6,7 +6,8 @@ pub type Figures = Option<(f64, f64)>;
 /// Indices of the points that no other point beats in cost and error at once, by rising cost.
 #[must_use]
 pub fn front(points: &[Figures]) -> Vec<usize> {
-    let mut order: Vec<(usize, f64, f64)> = points.iter().enumerate().filter_map(|(i, p)| p.map(|(cost, error)| (i, cost, error))).collect();
+    let mut order: Vec<(usize, f64, f64)> =
+        points.iter().enumerate().filter_map(|(i, p)| p.map(|(cost, error)| (i, cost, error))).collect();
     order.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.2.total_cmp(&b.2)).then(a.0.cmp(&b.0)));
     let mut best = f64::INFINITY;
     let mut front = Vec::new();
@@ -36,8 +37,7 @@ pub fn cheapest_where(points: &[Figures], budget: f64, wanted: impl Fn(usize) ->
 mod tests {
     use super::*;
 
-    const POINTS: [Figures; 6] =
-        [Some((3.0, 1e-6)), Some((1.0, 1e-2)), None, Some((2.0, 1e-2)), Some((2.0, 1e-4)), Some((5.0, 1e-5))];
+    const POINTS: [Figures; 6] = [Some((3.0, 1e-6)), Some((1.0, 1e-2)), None, Some((2.0, 1e-2)), Some((2.0, 1e-4)), Some((5.0, 1e-5))];
 
     #[test]
     fn the_front_holds_what_nothing_beats() {

@@ -55,10 +55,13 @@ pub fn svg(report: &StudyReport) -> Result<String, Box<dyn Error>> {
             .light_line_style(BLACK.mix(0.04))
             .bold_line_style(BLACK.mix(0.12))
             .draw()?;
-        // what meets the budget
-        if report.error_budget > bottom {
-            let budget = Rectangle::new([(left, bottom), (right, report.error_budget.min(top))], GREEN.mix(0.06).filled());
-            chart.draw_series([budget])?;
+        let shades = [
+            (report.error_budget, GREEN.mix(0.07), format!("within {} %", 100.0 * report.error_budget)),
+            (report.reference.own_error.unwrap_or(0.0), BLACK.mix(0.1), "error of the reference".to_owned()),
+        ];
+        for (height, colour, label) in shades.into_iter().filter(|s| s.0 > bottom) {
+            let series = chart.draw_series([Rectangle::new([(left, bottom), (right, height.min(top))], colour.filled())])?;
+            series.label(label).legend(move |(x, y)| Rectangle::new([(x + 2, y - 5), (x + 14, y + 5)], colour.filled()));
         }
         for (number, (name, points)) in curves(report).into_iter().enumerate() {
             let colour = COLOURS[number % COLOURS.len()];
@@ -76,8 +79,14 @@ pub fn svg(report: &StudyReport) -> Result<String, Box<dyn Error>> {
                 chart.draw_series(LineSeries::new(line.iter().copied(), colour.stroke_width(2)))?;
             }
             let dots = lines.concat();
-            let series = chart.draw_series(dots.into_iter().map(|at| Circle::new(at, 3, colour.filled())))?;
-            series.label(label).legend(move |(x, y)| Circle::new((x + 8, y), 4, colour.filled()));
+            if number < COLOURS.len() {
+                let series = chart.draw_series(dots.into_iter().map(|at| Circle::new(at, 3, colour.filled())))?;
+                series.label(label).legend(move |(x, y)| Circle::new((x + 8, y), 4, colour.filled()));
+            } else {
+                // the second turn of the colours has another shape
+                let series = chart.draw_series(dots.into_iter().map(|at| TriangleMarker::new(at, 5, colour.filled())))?;
+                series.label(label).legend(move |(x, y)| TriangleMarker::new((x + 8, y), 6, colour.filled()));
+            }
         }
         let ringed: Vec<_> = report.points.iter().zip(&places).filter(|(p, _)| p.pareto).filter_map(|(_, at)| *at).collect();
         let series = chart.draw_series(ringed.into_iter().map(|at| Circle::new(at, 7, BLACK.stroke_width(1))))?;

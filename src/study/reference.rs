@@ -142,9 +142,7 @@ impl ReferenceSource {
     /// If no way to run it completes, it is interrupted, or holds no loads.
     pub fn obtain(&self, key: &str, state: &mut StateFile, interrupted: &AtomicBool) -> Result<(Reference, History), StudyError> {
         let (reference, history) = match self {
-            Self::File { path, history, .. } => {
-                (Reference { what: path.clone(), own_error: None, wall_s: None }, History::clone(history))
-            }
+            Self::File { path, history, .. } => (Reference { what: path.clone(), own_error: None, wall_s: None }, History::clone(history)),
             Self::Run(candidates) => {
                 let (what, scene, integrator, ended) = candidates.run(interrupted)?;
                 if let Some(record) = state.runs(key).first() {

@@ -129,7 +129,10 @@ impl StudyReport {
             })
             .collect();
         let figures: Vec<Figures> = points.iter().map(|p| Some((p.run_time_s?.median, p.error?.peak))).collect();
-        front(&figures).into_iter().for_each(|i| points[i].pareto = true);
+        // nothing is known of errors below that of the reference
+        let floor = finished.reference.own_error.unwrap_or(0.0);
+        let known: Vec<Figures> = figures.iter().map(|f| f.map(|(cost, error)| (cost, error.max(floor)))).collect();
+        front(&known).into_iter().for_each(|i| points[i].pareto = true);
         let found = cheapest(&figures, error_budget);
         let lines = found.map(|point| Cheapest { point, lines: scene_lines(base, &grid.points[point]) });
         let some_errors = finished.runs.iter().flatten().find(|r| r.failure.is_none()).map_or(&[][..], |r| &r.errors);
