@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Writes the measured tables of README.md between their markers: validation, cost, loops. Needs target/release/pliant."""
+"""Writes the measured tables of README.md between their markers: validation, cost, loops, study. Needs target/release/pliant."""
 import argparse
 import json
 import math
@@ -7,6 +7,7 @@ import pathlib
 import re
 import subprocess
 import sys
+import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 PROGRAM = ROOT / "target" / "release" / "pliant"
@@ -131,7 +132,38 @@ def loops_table():
     return "\n".join(head + lines)
 
 
-TABLES = {"validation": validation_table, "cost": cost_table, "loops": loops_table}
+STUDIES = {
+    "01_double_pendulum": ("rigid chain",),
+    "02_hub_two_panels": ("hub with two panels", "--modes", "3,6,10", "--integrators", "dormand_prince,rosenbrock_w"),
+    "03_boom_tip_mass": ("boom with tip mass", "--modes", "4,8,12", "--integrators", "dormand_prince,rosenbrock_w"),
+    "06_four_bar": ("four-bar loop", "--closure-method", ",".join(METHODS)),
+}
+
+
+def study_table():
+    """The cheapest settings for two error budgets; draws examples/NAME/study.svg on the way."""
+    def setting(study):
+        if study["cheapest"] is None:
+            return "none"
+        point = study["points"][study["cheapest"]["point"]]
+        at = f"{point['tolerance']:.0e}".replace("e-0", "e-") if point["tolerance"] else f"{point['step']:.1e} s".replace("e-0", "e-")
+        changes = [f"{point['modes']} modes" if point["modes"] else "", point["closure_method"] or ""]
+        what = ", ".join([f"{point['integrator']} at {at}", *filter(None, changes)])
+        return f"{1e3 * point['run_time_s']['median']:.2g} ms: {what}"
+
+    rows = [("scene", "simulated", "cheapest within 1 %", "within 0.01 %"), ("---",) * 4]
+    for name, (title, *lists) in STUDIES.items():
+        folder = f"examples/{name}"
+        # the second budget takes all runs from the state file of the first
+        with tempfile.TemporaryDirectory() as scratch:
+            command = ["study", f"{folder}/scene.toml", *lists, "--state", f"{scratch}/state.jsonl"]
+            fine = pliant(*command, "--error", "0.01%")
+            coarse = pliant(*command, "--error", "1%", "--svg", f"{folder}/study.svg")
+        rows.append((f"[{title}]({folder}/study.svg)", f"{coarse['duration_s']:g} s", setting(coarse), setting(fine)))
+    return "\n".join("| " + " | ".join(row) + " |" for row in rows)
+
+
+TABLES = {"validation": validation_table, "cost": cost_table, "loops": loops_table, "study": study_table}
 
 
 def main():
