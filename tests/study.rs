@@ -298,6 +298,7 @@ fn lists_that_cannot_be_are_refused_by_name() {
         (&["--duration", "-1"], &["--duration -1"]),
         (&["--csv", &scene], &["--csv", "is an input"]),
         (&["--csv", "a.txt", "--svg", "a.txt"], &["--svg", "another output"]),
+        (&["--svg", "/nowhere/a.svg"], &["--svg /nowhere/a.svg", "may be written"]),
         (&["--state", "/nowhere/state"], &["--state /nowhere/state", "cannot be opened"]),
     ];
     for (arguments, expected) in cases {
@@ -372,6 +373,13 @@ mod flexible {
         let proposals = report["proposals"].to_string();
         assert!(proposals.contains("modes per body: 3 is enough"), "{proposals}");
         assert!(proposals.contains("inertia order: 0 is enough"), "{proposals}");
+        let done = pliant(&["study", &hub(), "--modes", "3,11"]);
+        assert_eq!(done.status.code(), Some(2));
+        assert!(
+            text(&done.stderr).contains("--modes: 11, but no modal file of the scene has more than 10 modes"),
+            "{}",
+            text(&done.stderr)
+        );
         let lines = report["cheapest"]["lines"].to_string();
         assert!(lines.contains("modes = { count = ") && lines.contains("inertia_order = "), "{lines}");
     }

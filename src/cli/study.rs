@@ -64,14 +64,16 @@ pub fn run(arguments: &StudyArguments, output: &mut dyn Write) -> Result<(), Fai
         Failure::Stopped(format!("interrupted with {done} of {total} runs finished; {how}"))
     };
     let finished = match finished {
-        Err(StudyError::Interrupted) => return Err(kept(0, grid.points.len() * arguments.repeat)),
+        Err(StudyError::Interrupted) => {
+            let message = "interrupted in the reference run; what the state file holds is kept, and there is nothing else yet";
+            return Err(Failure::Stopped(message.into()));
+        }
         other => other?,
     };
     if finished.resumed > 0 {
         notes.push(format!("{} of {} runs are from the state file", finished.resumed, finished.progress.1));
     }
     let report = StudyReport::new(&grid, &finished, arguments.repeat, arguments.error, notes);
-    write_files(arguments, &report)?;
     if arguments.json {
         let text = serde_json::to_string_pretty(&report).map_err(|e| Failure::Output(e.into()))?;
         writeln!(output, "{text}")?;
@@ -79,6 +81,7 @@ pub fn run(arguments: &StudyArguments, output: &mut dyn Write) -> Result<(), Fai
         write_tables(&report, output)?;
     }
     output.flush()?;
+    write_files(arguments, &report)?;
     if finished.interrupted {
         return Err(kept(finished.progress.0, finished.progress.1));
     }
@@ -124,6 +127,13 @@ fn check_targets(arguments: &StudyArguments, grid: &Grid) -> Result<(), Failure>
             return Err(Failure::input(message));
         }
         taken.push(path);
+    }
+    // a target that cannot be written must not cost the runs
+    for (option, target) in [("--csv", &arguments.csv), ("--svg", &arguments.svg)] {
+        if let Some(path) = target {
+            let opened = std::fs::OpenOptions::new().append(true).create(true).open(path);
+            opened.map_err(|e| Failure::input(format!("{option} {}: {e}; name a file that may be written", path.display())))?;
+        }
     }
     Ok(())
 }

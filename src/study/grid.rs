@@ -174,6 +174,7 @@ impl Grid {
         if base.hinges.is_empty() && base.closures.is_empty() {
             return Err(unfit("a study compares loads, and output.hinges and output.closures name none; name some or drop the keys"));
         }
+        check_modes(source, request)?;
         let mut variants = Vec::new();
         for &modes in &options(&request.modes) {
             for &inertia_order in &options(&request.orders) {
@@ -299,6 +300,24 @@ fn check(base: &Scene, request: &Request) -> Result<(), RequestError> {
     twice("--modes", &request.modes)?;
     twice("--orders", &request.orders)?;
     twice("--closure-method", &request.closure_methods)
+}
+
+/// Refuses a number of modes that no modal file has: two such numbers would stand for the same system.
+fn check_modes(source: &Source, request: &Request) -> Result<(), RequestError> {
+    if request.modes.is_empty() {
+        return Ok(());
+    }
+    let full = Variant { modes: Some(usize::MAX), ..Variant::default() };
+    // a scene whose lists do not hold for all modes is not at fault here
+    let Ok(scene) = full.assemble(source, request.duration) else { return Ok(()) };
+    let most = scene.system.bodies.iter().filter_map(|b| b.flexible()).map(crate::model::FlexibleBody::mode_count).max().unwrap_or(0);
+    match request.modes.iter().find(|n| **n > most) {
+        None => Ok(()),
+        Some(n) => Err(RequestError::List {
+            option: "--modes",
+            message: format!("{n}, but no modal file of the scene has more than {most} modes"),
+        }),
+    }
 }
 
 fn twice<T: PartialEq + std::fmt::Display>(option: &'static str, list: &[T]) -> Result<(), RequestError> {

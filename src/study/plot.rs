@@ -8,6 +8,8 @@ use std::error::Error;
 const SIZE: (u32, u32) = (900, 560);
 /// Errors below this are drawn here.
 const FLOOR: f64 = 1e-16;
+/// Run times below this are drawn here (s).
+const FASTEST: f64 = 1e-9;
 /// Colours of curves, in turn: those of Okabe and Ito, which all can tell apart.
 const COLOURS: [RGBColor; 7] = [
     RGBColor(0, 114, 178),
@@ -25,16 +27,17 @@ const COLOURS: [RGBColor; 7] = [
 /// If there is no point to draw.
 pub fn svg(report: &StudyReport) -> Result<String, Box<dyn Error>> {
     let places: Vec<Option<(f64, f64)>> = report.points.iter().map(place).collect();
-    let known: Vec<(f64, f64)> = places.iter().copied().flatten().collect();
-    if known.is_empty() {
+    if places.iter().all(Option::is_none) {
         return Err("no point has an error to draw".into());
     }
-    let range = |of: fn(&(f64, f64)) -> f64| {
-        let (low, high) = known.iter().map(of).fold((f64::INFINITY, 0.0_f64), |(l, h), x| (l.min(x), h.max(x)));
-        // whole decades
+    // whole decades
+    let range = |values: &mut dyn Iterator<Item = f64>| {
+        let (low, high) = values.fold((f64::INFINITY, 0.0_f64), |(l, h), x| (l.min(x), h.max(x)));
         (10.0_f64.powf(low.log10().floor()), 10.0_f64.powf(high.log10().floor() + 1.0))
     };
-    let ((left, right), (bottom, top)) = (range(|p| p.0), range(|p| p.1));
+    let (left, right) =
+        range(&mut report.points.iter().filter_map(|p| p.run_time_s).flat_map(|t| [t.min.max(FASTEST), t.max.max(FASTEST)]));
+    let (bottom, top) = range(&mut places.iter().flatten().map(|p| p.1));
     let mut text = String::new();
     {
         let root = SVGBackend::with_string(&mut text, SIZE).into_drawing_area();
@@ -78,6 +81,10 @@ pub fn svg(report: &StudyReport) -> Result<String, Box<dyn Error>> {
             for line in lines.iter().filter(|line| line.len() > 1) {
                 chart.draw_series(LineSeries::new(line.iter().copied(), colour.stroke_width(2)))?;
             }
+            // from the fastest to the slowest round
+            let spread = points.iter().filter_map(|&i| Some((report.points[i].run_time_s?, places[i]?.1)));
+            let spread = spread.map(|(t, y)| PathElement::new([(t.min.max(FASTEST), y), (t.max.max(FASTEST), y)], colour.mix(0.4)));
+            chart.draw_series(spread)?;
             let dots = lines.concat();
             if number < COLOURS.len() {
                 let series = chart.draw_series(dots.into_iter().map(|at| Circle::new(at, 3, colour.filled())))?;
@@ -93,7 +100,7 @@ pub fn svg(report: &StudyReport) -> Result<String, Box<dyn Error>> {
         series.label("Pareto front").legend(|(x, y)| Circle::new((x + 8, y), 6, BLACK.stroke_width(1)));
         chart
             .configure_series_labels()
-            .position(SeriesLabelPosition::UpperRight)
+            .position(SeriesLabelPosition::LowerLeft)
             .label_font(("sans-serif", 13))
             .background_style(WHITE.mix(0.85))
             .border_style(BLACK.mix(0.3))
@@ -105,7 +112,7 @@ pub fn svg(report: &StudyReport) -> Result<String, Box<dyn Error>> {
 
 /// Run time and error of a point that has both.
 fn place(point: &PointReport) -> Option<(f64, f64)> {
-    Some((point.run_time_s?.median.max(1e-9), point.error?.peak.max(FLOOR)))
+    Some((point.run_time_s?.median.max(FASTEST), point.error?.peak.max(FLOOR)))
 }
 
 /// Names of curves with the indices of their points, in order.
