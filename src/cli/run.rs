@@ -348,9 +348,7 @@ impl Progress {
         let _ = ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed));
         Self { bar: bar(settings), verifying: false, interrupted }
     }
-}
 
-impl Progress {
     /// What Ctrl-C asks of the loop.
     fn asked(&self) -> Flow {
         if self.interrupted.load(Ordering::Relaxed) { Flow::Stop } else { Flow::Continue }
