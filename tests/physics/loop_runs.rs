@@ -143,3 +143,19 @@ fn stretched_chain_ends_with_a_result_or_a_message() {
         assert!(!failure.to_string().is_empty());
     }
 }
+
+/// C01: at each change point another rod must carry the others, so that the independent coordinate changes hands during the run.
+#[test]
+fn independent_coordinates_are_chosen_again_where_they_grow_ill() {
+    let (system, start) = row_of_four_bars(2, "constraint_embedding");
+    let mut chosen = std::collections::BTreeSet::new();
+    let mut ratio = f64::INFINITY;
+    run(&system, &start, rk4(1e-3), 3.0, 100.0, |s| {
+        let embedding = &s.workspace.pose.embeddings[0];
+        ratio = ratio.min(embedding.pivot_ratio);
+        chosen.insert(embedding.independent.clone());
+    });
+    println!("independent coordinates {chosen:?}, smallest pivot ratio {ratio}");
+    // chosen again below a tenth
+    assert!(chosen.len() > 1 && ratio >= 0.1, "{chosen:?}, {ratio}");
+}
