@@ -53,7 +53,7 @@ pub mod modal_block;
 pub mod sweep;
 pub mod world;
 
-use crate::model::{State, System};
+use crate::model::{ClosureMethod, State, System};
 use closed_chain::ClosedChain;
 use nalgebra::Vector6;
 use sweep::acceleration_outward::AccelerationScratch;
@@ -69,7 +69,8 @@ pub enum DynamicsError {
     /// A hinge direction that moves no mass.
     #[error(
         "hinge \"{hinge}\" between \"{parent}\" and \"{child}\": the outboard inertia along its rate {rate} is {inertia:e}, which is zero beside {scale:e}; \
-         give \"{child}\" mass or inertia there, or fix or prescribe the hinge"
+         give \"{child}\" mass or inertia there, or fix or prescribe the hinge{}",
+        if *looped { ", or hold its loops by constraint_embedding, which asks for inertia of the loop alone" } else { "" }
     )]
     SingularHinge {
         /// Name of the hinge.
@@ -80,6 +81,8 @@ pub enum DynamicsError {
         child: String,
         /// 1-based number of the rate.
         rate: usize,
+        /// Whether cut closures load the system: embedded ones need no inertia of every link.
+        looped: bool,
         /// Pivot of `D` found.
         inertia: f64,
         /// What it was compared with.
@@ -172,7 +175,8 @@ impl DynamicsError {
         if stiffens && inertia.is_finite() && is_negative(inertia, scale) {
             return Self::OverDeformed { hinge, parent, child, rate, inertia };
         }
-        Self::SingularHinge { hinge, parent, child, rate, inertia, scale }
+        let looped = system.closures.iter().any(|c| c.method == ClosureMethod::TreeAugmented);
+        Self::SingularHinge { hinge, parent, child, rate, looped, inertia, scale }
     }
 
     /// True if the numbers themselves broke down, as in a motion that diverges: an inertia that is negative beyond rounding or not a

@@ -183,9 +183,14 @@ impl Evaluation {
     #[must_use]
     pub fn is_finite(&self) -> bool {
         let of_hinge = |h: &HingeEvaluation| h.acceleration.iter().chain(&h.load.moment).chain(&h.load.force).all(|x| x.is_finite());
+        let of_closure = |c: &ClosureEvaluation| {
+            let load = c.load.moment.iter().chain(&c.load.force).chain(&c.coordinate_force);
+            load.chain([&c.residual]).all(|x| x.is_finite())
+        };
         let energy = [self.energy.kinetic, self.energy.strain, self.energy.potential];
         self.hinges.iter().all(|(_, h)| of_hinge(h))
             && self.bodies.iter().all(|(_, b)| b.modal_acceleration.iter().all(|x| x.is_finite()))
+            && self.closures.iter().all(|(_, c)| of_closure(c))
             && energy.iter().all(|x| x.is_finite())
     }
 

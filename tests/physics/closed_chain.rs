@@ -534,3 +534,30 @@ fn gear_between_prescribed_hinges_holds_or_is_refused_by_name() {
         }
     }
 }
+
+/// A coupler without mass: the cut tree has no inertia there and says what has; the embedded loop moves as the loop with a light coupler.
+#[test]
+fn massless_link_inside_a_loop_needs_embedding() {
+    let with_coupler = |mass: f64, method: &str| {
+        let light = |name: &str| rigid(name, mass, [0.5, 0.0, 0.0], [mass / 12.0; 3]);
+        let mut crank = hinge("A", "revolute", &[Z], WORLD, "crank", [0.0; 3]);
+        crank.position = vec![std::f64::consts::FRAC_PI_3];
+        let mut coupler = hinge("B", "revolute", &[Z], "crank", "coupler", [CRANK, 0.0, 0.0]);
+        coupler.position = vec![-0.7];
+        let mut rocker = hinge("D", "revolute", &[Z], WORLD, "rocker", [2.0, 0.0, 0.0]);
+        rocker.position = vec![1.8];
+        let closures = vec![closure("C", "revolute", &[Z], "coupler", [COUPLER, 0.0, 0.0], "rocker", [ROCKER, 0.0, 0.0])];
+        let bodies = vec![rod("crank", CRANK), light("coupler"), rod("rocker", ROCKER)];
+        let gravity = Vector3::new(0.0, -G, 0.0);
+        let definition = Definition { gravity, bodies, hinges: vec![crank, coupler, rocker], closures, ..Definition::default() };
+        let (system, mut state) = held_by(method, definition).build().unwrap();
+        assembly::assemble(&system, &mut state).unwrap();
+        let mut workspace = Workspace::new(&system);
+        forward_dynamics(&system, &state, &mut workspace).map(|()| workspace.acceleration.hinge[0])
+    };
+    let error = with_coupler(0.0, METHODS[0]).unwrap_err().to_string();
+    assert!(error.contains("\"B\"") && error.contains("constraint_embedding"), "{error}");
+    let (massless, light) = (with_coupler(0.0, METHODS[1]).unwrap(), with_coupler(1e-9, METHODS[0]).unwrap());
+    // a coupler of 1e-9 kg beside rods of 0.5 and 1.5 kg
+    assert!((massless / light - 1.0).abs() < 1e-7, "{massless} {light}");
+}
