@@ -103,11 +103,7 @@ fn correct(system: &System, state: &mut State, workspace: &mut Workspace, positi
     }
     chain.right = right;
     chain.schur.solve(&chain.cut_right, &mut chain.cut_lambda);
-    chain.scatter_cut();
-    let impulse = std::mem::take(&mut chain.lambda);
-    chain.push(system, pose, &impulse);
-    chain.lambda = impulse;
-    chain.response.solve(system, pose, inertia, &chain.all);
+    chain.respond(system, pose, inertia);
     let (hinge, modal) = (&chain.response.hinge, &chain.response.modal);
     for body in system.bodies.iter().filter(|b| !b.hinge.is_prescribed()) {
         let (q, v) = (body.position_range(), body.velocity_range());

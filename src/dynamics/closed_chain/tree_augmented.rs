@@ -56,11 +56,7 @@ impl ClosedChain {
             return Err(self.contradiction(system));
         }
 
-        self.scatter_cut();
-        let lambda = std::mem::take(&mut self.lambda);
-        self.push(system, pose, &lambda);
-        self.lambda = lambda;
-        self.response.solve(system, pose, inertia, &self.all);
+        self.respond(system, pose, inertia);
         let part = &self.response;
         for k in 0..system.bodies.len() {
             force.bodies[k].z_plus += part.z_plus[k];
@@ -103,11 +99,7 @@ impl ClosedChain {
             *x = -self.right[row];
         }
         self.schur.solve(&self.cut_right, &mut self.cut_lambda);
-        self.scatter_cut();
-        let lambda = std::mem::take(&mut self.lambda);
-        self.push(system, pose, &lambda);
-        self.lambda = lambda;
-        self.response.solve(system, pose, inertia, &self.all);
+        self.respond(system, pose, inertia);
         response.hinge.iter_mut().zip(&self.response.hinge).for_each(|(x, d)| *x += d);
         response.modal.iter_mut().zip(&self.response.modal).for_each(|(x, d)| *x += d);
     }
@@ -119,12 +111,16 @@ impl ClosedChain {
         self.schur.factor(threshold).map_err(|_: NotFactored| DynamicsError::BrokenClosures { closure: name().unwrap_or_default() })
     }
 
-    /// Multipliers of the cut closures to their places among those of all, and zero for the others.
-    pub(super) fn scatter_cut(&mut self) {
+    /// Response of all bodies to the multipliers of the cut closures, which take their places among those of all; zero for the others.
+    pub(super) fn respond(&mut self, system: &System, pose: &PoseScratch, inertia: &InertiaScratch) {
         self.lambda.fill(0.0);
         for (&row, l) in self.cut.iter().zip(&self.cut_lambda) {
             self.lambda[row] = *l;
         }
+        let lambda = std::mem::take(&mut self.lambda);
+        self.push(system, pose, &lambda);
+        self.lambda = lambda;
+        self.response.solve(system, pose, inertia, &self.all);
     }
 
     /// The closure that has most of its directions where no multiplier reaches.
