@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Writes the measured tables of README.md between their markers: validation, cost, loops, study. Needs target/release/pliant."""
+"""Writes the measured tables of README.md between their markers: validation, cost, loops, study, residual. Needs target/release/pliant."""
 import argparse
 import json
 import math
@@ -8,6 +8,11 @@ import re
 import subprocess
 import sys
 import tempfile
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt  # noqa: E402
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 PROGRAM = ROOT / "target" / "release" / "pliant"
@@ -163,7 +168,29 @@ def study_table():
     return "\n".join("| " + " | ".join(row) + " |" for row in rows)
 
 
-TABLES = {"validation": validation_table, "cost": cost_table, "loops": loops_table, "study": study_table}
+def residual_table():
+    """Errors on the panel slew over the number of modes, with and without residual modes; draws examples/11_panel_slew/modes.svg."""
+    folder = "examples/11_panel_slew"
+    counts = (1, 2, 4, 6, 8, 12, 16, 20, 30, 40)
+    study = pliant("study", f"{folder}/scene.toml", "--integrators", "rosenbrock_w", "--tolerances", "1e-6", "--repeat", "1",
+                   "--modes", ",".join(map(str, counts)), "--residual-modes", "off,on")
+    points = {(p["modes"], p["residual_modes"]): p for p in study["points"]}
+    rows = [("modes of 40", "error without residual modes", "with them", "modes in all (inner, outer)"), ("---",) * 4]
+    for count in counts:
+        plain, residual = points[count, False], points[count, True]
+        errors = (f"{p['error']['peak']:.1e}".replace("e-0", "e-") for p in (plain, residual))
+        rows.append((str(count), *errors, f"{plain['retained_modes']} and {residual['retained_modes']}"))
+    figure, axes = plt.subplots(figsize=(6.4, 3.6), layout="constrained")
+    for on, label, marker in ((False, "without residual modes", "o-"), (True, "with residual modes", "s-")):
+        axes.semilogy(counts, [points[count, on]["error"]["peak"] for count in counts], marker, label=label)
+    axes.axhline(0.01, color="grey", linewidth=0.8, linestyle="--")
+    axes.set(xlabel="modes of the file kept per panel", ylabel="largest error of a hinge load", title="panel slew")
+    axes.legend()
+    figure.savefig(ROOT / folder / "modes.svg", metadata={"Date": None})
+    return "\n".join("| " + " | ".join(row) + " |" for row in rows)
+
+
+TABLES = {"validation": validation_table, "cost": cost_table, "loops": loops_table, "study": study_table, "residual": residual_table}
 
 
 def main():

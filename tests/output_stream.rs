@@ -29,7 +29,7 @@ fn hub_with_two_panels() -> Result<(System, State, OutputPlan), Box<dyn Error>> 
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("modes/panel_cantilever.h5");
     let (file, modal) = ModalFile::load_body(&path)?;
     let count = modal.mode_count();
-    let numbers: Vec<usize> = (1..=count).collect();
+    let names: Vec<String> = (1..=count).map(|i| format!("mode {i}")).collect();
     let surface = Arc::new(file.read_surface(&(0..count).collect::<Vec<_>>())?);
     let (integrals, modal) = (Arc::new(ModalIntegrals::of(&modal)), Arc::new(modal));
     let hub = BodyDefinition {
@@ -45,7 +45,7 @@ fn hub_with_two_panels() -> Result<(System, State, OutputPlan), Box<dyn Error>> 
         kind: BodyDefinitionKind::Flexible(FlexibleDefinition {
             modal: Arc::clone(&modal),
             integrals: Arc::clone(&integrals),
-            mode_numbers: numbers.clone(),
+            mode_names: names.clone(),
             damping_ratio: vec![0.005; count],
             order: InertiaOrder::Second,
             modal_position: vec![],

@@ -65,6 +65,9 @@ pub struct SceneArguments {
     /// Retain the lowest N modes of every flexible body
     #[arg(long, value_name = "N")]
     pub modes: Option<usize>,
+    /// Add residual modes that answer loads for the modes left out, to every flexible body that leaves some out
+    #[arg(long)]
+    pub residual_modes: bool,
     /// Make this flexible body rigid (may be given several times)
     #[arg(long, value_name = "BODY")]
     pub rigid: Vec<String>,
@@ -107,6 +110,12 @@ pub struct StudyArguments {
     /// Lowest modes to retain of every flexible body [default: those of the scene]
     #[arg(long, value_name = "N,...", value_delimiter = ',')]
     pub modes: Vec<usize>,
+    /// Without residual modes for those left out, with them, or both: off, on [default: as the scene has it]
+    #[arg(long, value_name = "off,on", value_delimiter = ',', value_parser = switch)]
+    pub residual_modes: Vec<bool>,
+    /// Without the geometric stiffness of the modal files, with it, or both: off, on [default: as the scene has it]
+    #[arg(long, value_name = "off,on", value_delimiter = ',', value_parser = switch)]
+    pub geometric_stiffness: Vec<bool>,
     /// Orders of the inertia in the modal coordinates: 0, 1, 2 [default: those of the scene]
     #[arg(long, value_name = "N,...", value_delimiter = ',')]
     pub orders: Vec<u8>,
@@ -137,6 +146,15 @@ pub struct StudyArguments {
     /// Print one JSON object instead of tables
     #[arg(long)]
     pub json: bool,
+}
+
+/// "on" or "off".
+fn switch(text: &str) -> Result<bool, String> {
+    match text {
+        "on" => Ok(true),
+        "off" => Ok(false),
+        _ => Err("write on, off, or off,on".to_owned()),
+    }
 }
 
 /// "1%" or "0.01".

@@ -13,6 +13,7 @@ impl From<&SceneArguments> for Overrides {
         Self {
             integrator: arguments.integrator.clone(),
             modes: arguments.modes,
+            residual_modes: arguments.residual_modes.then_some(true),
             rigid: arguments.rigid.clone(),
             closure_method: arguments.closure_method.clone(),
             ..Self::default()

@@ -297,7 +297,7 @@ fn announce(scene: &Scene, settings: &Settings, left_out: &[String]) {
     if let Some(mode) = fastest_mode(system) {
         let stable = settings.method.stable_step(mode.frequency_hz, mode.damping_ratio);
         let limit = if stable.is_finite() { format!("stable step {} s", number(stable)) } else { "stable at any step".to_owned() };
-        lines.push(format!("fastest retained mode: mode {} of \"{}\" at {} Hz; {limit}", mode.mode, mode.body, number(mode.frequency_hz)));
+        lines.push(format!("fastest retained mode: {} of \"{}\" at {} Hz; {limit}", mode.mode, mode.body, number(mode.frequency_hz)));
         if let Method::RungeKutta4 { step } = settings.method
             && step > stable
         {

@@ -4,7 +4,7 @@ use super::failure::Failure;
 use super::report::{Align, Table, number};
 use crate::output::RunReport;
 use crate::output::evaluation::Named;
-use crate::output::report::LoadPeak;
+use crate::output::report::{LoadPeak, TruncationFigures, share};
 use crate::study::verify::{LoadDifference, Verification};
 use std::io::Write;
 
@@ -23,22 +23,26 @@ pub fn write(scene: &str, report: &RunReport, output: &mut dyn Write) -> Result<
     )?;
     let right = Align::Right;
     writeln!(output, "\npeak hinge loads over all steps, by the parent on the child, moment about O:")?;
-    load_peaks("hinge", &report.peaks.hinges).write(output)?;
+    load_peaks("hinge", &report.peaks.hinges, report.truncation.as_ref().map(|t| &t.hinges)).write(output)?;
     if !report.peaks.closures.0.is_empty() {
         writeln!(output, "\npeak closure loads over all steps, on b, moment about b's point; of a gear what acts on coordinate b:")?;
-        load_peaks("closure", &report.peaks.closures).write(output)?;
+        load_peaks("closure", &report.peaks.closures, report.truncation.as_ref().map(|t| &t.closures)).write(output)?;
     }
     if !report.peaks.bodies.0.is_empty() {
-        let mut bodies = Table::new(&[
+        let mut columns = vec![
             ("body", Align::Left),
             ("peak von Mises (Pa)", right),
             ("at (s)", right),
             ("node", right),
             ("place x, y, z (m)", Align::Left),
-        ]);
+        ];
+        columns.extend(report.truncation.as_ref().map(|_| (LEFT_OUT, right)));
+        let mut bodies = Table::new(&columns);
         for (name, peak) in report.peaks.bodies.iter() {
             let place = peak.position.map(number).join(", ");
-            bodies.row([name.to_owned(), number(peak.von_mises), number(peak.time_s), peak.node.to_string(), place]);
+            let mut row = vec![name.to_owned(), number(peak.von_mises), number(peak.time_s), peak.node.to_string(), place];
+            row.extend(report.truncation.as_ref().map(|t| percent(t.bodies.get(name).and_then(|c| share(c.von_mises, peak.von_mises)))));
+            bodies.row(row);
         }
         writeln!(output, "\npeak stress over the output times:")?;
         bodies.write(output)?;
@@ -116,12 +120,29 @@ pub fn write_verification(verification: &Verification, output: &mut dyn Write) -
 }
 
 /// Peaks of moments and forces; `of` is what carries them.
-fn load_peaks(of: &str, peaks: &Named<LoadPeak>) -> Table {
+fn load_peaks(of: &str, peaks: &Named<LoadPeak>, left_out: Option<&Named<TruncationFigures>>) -> Table {
     let right = Align::Right;
-    let mut table =
-        Table::new(&[(of, Align::Left), ("peak moment (N m)", right), ("at (s)", right), ("peak force (N)", right), ("at (s)", right)]);
+    let estimate = left_out.map(|_| (LEFT_OUT, right));
+    let mut columns = vec![(of, Align::Left), ("peak moment (N m)", right), ("at (s)", right)];
+    columns.extend(estimate);
+    columns.extend([("peak force (N)", right), ("at (s)", right)]);
+    columns.extend(estimate);
+    let mut table = Table::new(&columns);
     for (name, peak) in peaks.iter() {
-        table.row([name.to_owned(), number(peak.moment), number(peak.moment_time_s), number(peak.force), number(peak.force_time_s)]);
+        let change = left_out.map(|changes| changes.get(name).copied().unwrap_or_default());
+        let mut row = vec![name.to_owned(), number(peak.moment), number(peak.moment_time_s)];
+        row.extend(change.map(|c| percent(share(c.moment, peak.moment))));
+        row.extend([number(peak.force), number(peak.force_time_s)]);
+        row.extend(change.map(|c| percent(share(c.force, peak.force))));
+        table.row(row);
     }
     table
+}
+
+/// Heading of what the modes left out would change, relative to the peak beside it.
+const LEFT_OUT: &str = "left-out modes";
+
+/// A share of a peak in percent.
+fn percent(share: Option<f64>) -> String {
+    share.map_or_else(|| "-".to_owned(), |s| format!("{:.2} %", 100.0 * s))
 }

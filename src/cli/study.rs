@@ -5,7 +5,7 @@ use super::failure::{Failure, with_causes};
 use super::report::{Align, Table};
 use crate::scene::SceneError;
 use crate::scene::error::Source;
-use crate::study::grid::RequestError;
+use crate::study::grid::{RequestError, Variant};
 use crate::study::reference::{Candidates, ReferenceSource};
 use crate::study::report::PointReport;
 use crate::study::{ChannelError, Grid, Request, StateError, StateFile, StudyError, StudyReport, Watch, plot, runner};
@@ -29,6 +29,8 @@ pub fn run(arguments: &StudyArguments, output: &mut dyn Write) -> Result<(), Fai
         tolerances: arguments.tolerances.clone(),
         steps: arguments.steps.clone(),
         modes: arguments.modes.clone(),
+        residual_modes: arguments.residual_modes.clone(),
+        geometric_stiffness: arguments.geometric_stiffness.clone(),
         orders: arguments.orders.clone(),
         closure_methods: arguments.closure_method.clone(),
         duration: arguments.duration,
@@ -179,6 +181,7 @@ fn write_tables(report: &StudyReport, output: &mut dyn Write) -> Result<(), Fail
         ("integrator", Align::Left),
         ("accuracy", right),
         ("modes", right),
+        ("with", Align::Left),
         ("order", right),
         ("closures", Align::Left),
         ("run time (s)", right),
@@ -236,6 +239,7 @@ fn row(point: &PointReport, cheapest: bool) -> Vec<String> {
         setting.integrator.clone(),
         optional(accuracy),
         optional(setting.variant.modes.map(|n| n.to_string())),
+        added(&setting.variant),
         optional(setting.variant.inertia_order.map(|o| o.to_string())),
         optional(setting.variant.closure_method.clone()),
         time(|t| t.median),
@@ -246,6 +250,14 @@ fn row(point: &PointReport, cheapest: bool) -> Vec<String> {
         optional(point.error.map(|e| format!("{:.1e}", e.rms))),
         point.failure.as_ref().map_or_else(|| worst.map_or_else(String::new, |w| w.0.to_owned()), |f| format!("failed: {f}")),
     ]
+}
+
+/// What a variant adds to the modes, or expressly does not.
+fn added(variant: &Variant) -> String {
+    let switches = [(variant.residual_modes, "residual modes"), (variant.geometric_stiffness, "geometric stiffness")];
+    let said = switches.iter().filter_map(|(on, what)| on.map(|on| if on { (*what).to_owned() } else { format!("no {what}") }));
+    let said: Vec<_> = said.collect();
+    if said.is_empty() { "-".into() } else { said.join(", ") }
 }
 
 /// The bar counts runs.

@@ -274,6 +274,12 @@ impl NewtonEuler {
         spatial(&axes.tr_mul(&angular(&self.load[k])), &axes.tr_mul(&linear(&self.load[k])))
     }
 
+    /// Row of modal coordinate `m` at the last sweep: inertia, elastic and damping forces less external ones, without hinge loads.
+    #[must_use]
+    pub fn modal_row(&self, m: usize) -> f64 {
+        self.modal[m]
+    }
+
     /// Acceleration of the recursion's frame of body `k` at the last sweep, less gravity, in its axes.
     #[must_use]
     pub fn body_acceleration(&self, k: usize) -> Vector6<f64> {

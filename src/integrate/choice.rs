@@ -36,7 +36,7 @@ pub fn choose(system: &System, tolerance: Tolerance, largest_step: f64, rate_hz:
     let shown = frequencies.filter(|f| *f <= 0.5 * rate_hz).fold(0.0, f64::max);
     let shown = if shown > 0.0 { shown } else { 0.5 * rate_hz };
     let accurate = tolerance.relative.cbrt() / (STEPS_PER_PERIOD * shown);
-    let name = format!("mode {mode} of \"{body}\" at {frequency_hz:.4} Hz");
+    let name = format!("{mode} of \"{body}\" at {frequency_hz:.4} Hz");
     if stable < accurate.min(largest_step) {
         let reason = format!(
             "rosenbrock_w: {name} would hold dormand_prince to steps of {stable:.2e} s, while motion up to {shown:.4} Hz, all that \

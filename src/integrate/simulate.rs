@@ -445,8 +445,8 @@ fn fastest_place(chart: &Chart<'_>) -> String {
         places.push((speed, format!("rate {} of hinge \"{}\"", rate + 1, body.hinge.name)));
         if let Some(flexible) = body.flexible() {
             let (mode, speed) = fastest(&state.modal_velocity[body.modal_range()]);
-            if let Some(number) = flexible.mode_numbers.get(mode) {
-                places.push((speed, format!("mode {number} of body \"{}\"", body.name)));
+            if let Some(name) = flexible.mode_names.get(mode) {
+                places.push((speed, format!("{name} of body \"{}\"", body.name)));
             }
         }
     }

@@ -9,8 +9,8 @@ use std::f64::consts::TAU;
 pub struct FastestMode {
     /// Body that has it.
     pub body: String,
-    /// Its 1-based number in the modal file.
-    pub mode: usize,
+    /// Its name, as "mode 3".
+    pub mode: String,
     /// Hz.
     pub frequency_hz: f64,
     /// Damping ratio.
@@ -24,7 +24,7 @@ pub fn fastest_mode(system: &System) -> Option<FastestMode> {
         f.stiffness.iter().enumerate().map(move |(j, k)| {
             let omega = k.max(0.0).sqrt();
             let damping_ratio = if omega > 0.0 { 0.5 * f.damping[j] / omega } else { 0.0 };
-            FastestMode { body: b.name.clone(), mode: f.mode_numbers[j], frequency_hz: omega / TAU, damping_ratio }
+            FastestMode { body: b.name.clone(), mode: f.mode_names[j].clone(), frequency_hz: omega / TAU, damping_ratio }
         })
     });
     modes.max_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz))

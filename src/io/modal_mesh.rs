@@ -5,10 +5,28 @@
 use super::array::ElementType;
 use super::error::ModalFileError;
 use super::modal_file::{ModalFile, vectors};
+use crate::model::ModeBasis;
 use crate::model::surface::{StressModes, StressPlace, Surface};
-use nalgebra::Vector3;
+use crate::spatial::shift::spatial;
+use nalgebra::{Vector3, Vector6};
 
 impl ModalFile {
+    /// The surface with the modes `basis`.
+    ///
+    /// # Errors
+    /// As [`Self::read_surface`].
+    pub fn read_surface_in(&self, basis: &ModeBasis) -> Result<Surface, ModalFileError> {
+        if !basis.has_residual() {
+            return self.read_surface(&basis.whole);
+        }
+        let mut surface = self.read_surface(&(0..basis.available()).collect::<Vec<_>>())?;
+        surface.displacement = combined(&surface.displacement, basis);
+        if let Some(stress) = &mut surface.stress {
+            stress.values = combined(&stress.values, basis);
+        }
+        Ok(surface)
+    }
+
     /// The surface with the modes `modes` (0-based, in that order).
     ///
     /// # Errors
@@ -44,6 +62,17 @@ impl ModalFile {
     /// As [`Self::node_displacement`].
     pub fn node_rotation(&self, node: usize) -> Result<Option<Vec<Vector3<f64>>>, ModalFileError> {
         if self.has_rotation() { self.read_node("rotation", node).map(Some) } else { Ok(None) }
+    }
+
+    /// Shape (rotation; translation) of one node in every mode, length n; without rotation where the file has no nodal rotations.
+    ///
+    /// # Errors
+    /// As [`Self::node_displacement`].
+    pub fn node_shape(&self, node: usize) -> Result<Vec<Vector6<f64>>, ModalFileError> {
+        let rotation = self.node_rotation(node)?;
+        let displacement = self.node_displacement(node)?;
+        let turn = |mode: usize| rotation.as_ref().map_or_else(Vector3::zeros, |r| r[mode]);
+        Ok(displacement.iter().enumerate().map(|(mode, u)| spatial(&turn(mode), u)).collect())
     }
 
     /// Undeformed position (m, body axes) of one node.
@@ -194,4 +223,19 @@ impl ModalFile {
 /// Rows of six in single precision.
 fn sixes(values: &[f64]) -> Vec<[f32; 6]> {
     values.chunks_exact(6).map(|s| [s[0], s[1], s[2], s[3], s[4], s[5]].map(|v| v as f32)).collect()
+}
+
+/// Values per node in single precision, given for each mode of the file, for each mode of `basis`; summed in double precision.
+fn combined<const N: usize>(of_mode: &[Vec<[f32; N]>], basis: &ModeBasis) -> Vec<Vec<[f32; N]>> {
+    let mut all: Vec<_> = basis.whole.iter().map(|&j| of_mode[j].clone()).collect();
+    for column in basis.residual.column_iter() {
+        let mut sum = vec![[0.0_f64; N]; of_mode.first().map_or(0, Vec::len)];
+        for (values, factor) in of_mode.iter().zip(column.iter()).filter(|(_, f)| **f != 0.0) {
+            for (sum, value) in sum.iter_mut().zip(values) {
+                (0..N).for_each(|i| sum[i] += factor * f64::from(value[i]));
+            }
+        }
+        all.push(sum.into_iter().map(|s| s.map(|x| x as f32)).collect());
+    }
+    all
 }

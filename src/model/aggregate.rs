@@ -55,7 +55,7 @@ impl Aggregate {
             let what = if m.rates.contains(&j) {
                 format!("rate {} of hinge \"{}\"", j - m.rates.start + 1, body.hinge.name)
             } else {
-                format!("mode {}", body.flexible().map_or(0, |f| f.mode_numbers[j - m.modes.start]))
+                body.flexible().map_or_else(String::new, |f| f.mode_names[j - m.modes.start].clone())
             };
             (what, body.name.clone())
         };

@@ -329,7 +329,7 @@ impl Builder<'_> {
             damping: omega.iter().zip(&flexible.damping_ratio).map(|(w, z)| 2.0 * z * w).collect(),
             order: flexible.order,
             inboard,
-            mode_numbers: flexible.mode_numbers.clone(),
+            mode_names: flexible.mode_names.clone(),
             unused_stiffening: match &flexible.modal.geometric_stiffness {
                 Some(matrices) if !flexible.integrals.has_geometric_stiffness() => {
                     (0..n).map(|j| std::array::from_fn(|load| matrices[load][(j, j)])).collect()

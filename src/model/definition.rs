@@ -40,8 +40,8 @@ pub struct FlexibleDefinition {
     pub modal: Arc<ModalBody>,
     /// The same, packed, with its geometric stiffness or without; share it between bodies of one file and one choice of modes.
     pub integrals: Arc<ModalIntegrals>,
-    /// 1-based numbers of the retained modes in the file.
-    pub mode_numbers: Vec<usize>,
+    /// Names of the retained modes, as "mode 3".
+    pub mode_names: Vec<String>,
     /// Damping ratio per retained mode.
     pub damping_ratio: Vec<f64>,
     /// Inertia order.

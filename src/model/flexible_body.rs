@@ -196,8 +196,8 @@ pub struct FlexibleBody {
     pub order: InertiaOrder,
     /// Frame O of the inboard hinge.
     pub inboard: Attachment,
-    /// 1-based numbers of the retained modes in the modal file.
-    pub mode_numbers: Vec<usize>,
+    /// Names of the retained modes, as "mode 3" for the third of the modal file.
+    pub mode_names: Vec<String>,
     /// Per mode, the diagonal of the 12 geometric stiffness matrices that the modal data have but the integrals leave out; empty if none.
     pub unused_stiffening: Vec<[f64; INERTIAL_LOADS]>,
 }

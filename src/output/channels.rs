@@ -151,7 +151,7 @@ fn body_channels(body: &Body, stress: bool, out: &mut Vec<Channel>) {
     out.push(Channel { frame: world.clone(), point, ..new("position", Some(3), "m").components("x, y, z") });
     out.push(Channel { frame: world, ..new("quaternion", Some(4), "1").components("w, x, y, z") });
     if let Some(flexible) = body.flexible() {
-        let modes = flexible.mode_numbers.iter().map(|n| format!("mode {n}")).collect::<Vec<_>>().join(", ");
+        let modes = flexible.mode_names.join(", ");
         for (quantity, suffix) in [("modal_position", ""), ("modal_velocity", "/s"), ("modal_acceleration", "/s^2")] {
             out.push(new(quantity, Some(flexible.mode_count()), &format!("{MODAL_UNIT}{suffix}")).components(modes.as_str()));
         }

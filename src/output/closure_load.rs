@@ -33,6 +33,17 @@ impl ClosureLoad {
         }
     }
 
+    /// Magnitudes of the difference in moment (N m) and force (N) from another load of the same closure.
+    #[must_use]
+    pub fn difference(&self, other: &Self) -> [f64; 2] {
+        match (self, other) {
+            (Self::Joint(a), Self::Joint(b)) => Self::Joint(a - b).magnitudes(),
+            (Self::GearMoment(a), Self::GearMoment(b)) => Self::GearMoment(a - b).magnitudes(),
+            (Self::GearForce(a), Self::GearForce(b)) => Self::GearForce(a - b).magnitudes(),
+            _ => [0.0; 2],
+        }
+    }
+
     /// Magnitudes of moment (N m) and force (N).
     #[must_use]
     pub fn magnitudes(&self) -> [f64; 2] {

@@ -21,6 +21,7 @@ pub mod set;
 pub mod stiffening;
 pub mod surface;
 pub mod tracker;
+pub mod truncation;
 pub mod viewer;
 
 pub use evaluation::Evaluation;

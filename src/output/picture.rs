@@ -180,7 +180,7 @@ fn body_picture(plan: &OutputPlan, k: usize, body: &Body) -> BodyPicture {
     });
     let mode_names = body.flexible().map_or_else(Vec::new, |flexible| {
         let frequency = flexible.stiffness.iter().map(|k| k.max(0.0).sqrt() / std::f64::consts::TAU);
-        flexible.mode_numbers.iter().zip(frequency).map(|(n, f)| format!("mode {n}, {f:.3} Hz ({})", super::channels::MODAL_UNIT)).collect()
+        flexible.mode_names.iter().zip(frequency).map(|(n, f)| format!("{n}, {f:.3} Hz ({})", super::channels::MODAL_UNIT)).collect()
     });
     BodyPicture { name: body.name.clone(), shape, surface, modes: body.modal_range(), mode_names }
 }

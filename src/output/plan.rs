@@ -2,8 +2,9 @@
 
 pub use crate::scene::Monitor;
 
-use crate::model::Surface;
-use crate::model::System;
+use crate::model::left_out::LeftOutModes;
+use crate::model::surface::StressModes;
+use crate::model::{Surface, System};
 use std::sync::Arc;
 use thiserror::Error;
 
@@ -40,6 +41,16 @@ pub struct BodyBox {
     pub center: [f64; 3],
 }
 
+/// Modes that a scene leaves out.
+#[derive(Debug, Clone)]
+pub struct TruncationPlan {
+    /// The system with all modes beside them.
+    pub modes: Arc<LeftOutModes>,
+    /// For each surface of the plan whose stress is evaluated and whose body leaves modes out: the stress of those, and the body's place
+    /// among those that leave modes out.
+    pub stress: Vec<Option<(Arc<StressModes>, usize)>>,
+}
+
 /// Everything that a run puts out.
 #[derive(Debug, Clone)]
 pub struct OutputPlan {
@@ -61,6 +72,8 @@ pub struct OutputPlan {
     pub monitors: Vec<Monitor>,
     /// Factor on the deformation in pictures; never on numbers.
     pub deformation_scale: f64,
+    /// Modes that the scene leaves out, whose effect is estimated; none if none are or nobody asks.
+    pub truncation: Option<TruncationPlan>,
     /// True if an independent Newton-Euler sweep checks the loads at every output time.
     pub audit: bool,
 }
@@ -77,6 +90,7 @@ impl Default for OutputPlan {
             boxes: Vec::new(),
             monitors: Vec::new(),
             deformation_scale: 1.0,
+            truncation: None,
             audit: false,
         }
     }

@@ -47,6 +47,60 @@ pub struct BodyPeak {
     pub position: [f64; 3],
 }
 
+/// How much the modes left out change the load of one hinge or closure at most, an estimate.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct TruncationFigures {
+    /// N m.
+    pub moment: f64,
+    /// N.
+    pub force: f64,
+}
+
+/// How much the modes left out change the largest stress of one body at most, an estimate.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct StressTruncation {
+    /// Pa.
+    pub von_mises: f64,
+}
+
+/// What the modes left out would change: estimates over the output times, to be held against the peaks.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct Truncation {
+    /// By hinge.
+    pub hinges: Named<TruncationFigures>,
+    /// By closure.
+    pub closures: Named<TruncationFigures>,
+    /// By body that leaves modes out and whose stress is evaluated.
+    pub bodies: Named<StressTruncation>,
+}
+
+impl Truncation {
+    /// The worst change of a load or a stress relative to its peak, and what it is of. Loads that are rounding do not count.
+    #[must_use]
+    pub fn worst(&self, peaks: &Peaks) -> Option<(f64, String)> {
+        let mut found = Vec::new();
+        for (kind, changes, peaks) in [("hinge", &self.hinges, &peaks.hinges), ("closure", &self.closures, &peaks.closures)] {
+            for (name, change) in changes.iter() {
+                let Some(peak) = peaks.get(name) else { continue };
+                for (quantity, change, of) in [("moment", change.moment, peak.moment), ("force", change.force, peak.force)] {
+                    found.extend(share(change, of).map(|s| (s, format!("the {quantity} at {kind} \"{name}\""))));
+                }
+            }
+        }
+        for (name, change) in self.bodies.iter() {
+            let share = peaks.bodies.get(name).and_then(|peak| share(change.von_mises, peak.von_mises));
+            found.extend(share.map(|s| (s, format!("the stress of \"{name}\""))));
+        }
+        found.into_iter().max_by(|a, b| a.0.total_cmp(&b.0))
+    }
+}
+
+/// `change` relative to `peak`; none beside a peak that is rounding.
+#[must_use]
+pub fn share(change: f64, peak: f64) -> Option<f64> {
+    (peak > 1e-9).then(|| change / peak)
+}
+
 /// Peaks: of loads over all steps and output times, of stress over the output times.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Peaks {
@@ -130,6 +184,8 @@ pub struct RunReport {
     pub errors: ErrorFigures,
     /// Peaks.
     pub peaks: Peaks,
+    /// What the modes left out would change, an estimate; none where none are left out.
+    pub truncation: Option<Truncation>,
     /// Evaluation at the end; none if the end state has no evaluation.
     #[serde(rename = "final")]
     pub end: Option<Evaluation>,

@@ -1,12 +1,13 @@
 //! From a scene to the plan of its outputs: surfaces are read here, and only where a picture or a stress figure wants them.
 
-use super::plan::{BodyBox, BodySurface, ModalFileRecord, OutputPlan};
+use super::plan::{BodyBox, BodySurface, ModalFileRecord, OutputPlan, TruncationPlan};
 use crate::io::ModalFileError;
-use crate::model::BodyKind;
 use crate::model::Surface;
+use crate::model::{BodyKind, ModeBasis};
 use crate::scene::{Monitor, Scene};
 use std::collections::HashMap;
 use std::path::PathBuf;
+use std::rc::Rc;
 use std::sync::Arc;
 
 /// The plan of `scene`; with `picture`, surfaces of all flexible bodies are read, else only those whose stress is wanted.
@@ -15,7 +16,8 @@ use std::sync::Arc;
 /// If the surface of a modal file cannot be read.
 pub fn plan(scene: &Scene, picture: bool) -> Result<OutputPlan, ModalFileError> {
     let monitored = |body: usize| scene.monitors.iter().any(|m| matches!(m, Monitor::Body { body: b, .. } if *b == body));
-    let mut shared: HashMap<(PathBuf, Vec<usize>), Arc<Surface>> = HashMap::new();
+    // bodies of one file and one choice of modes share their basis
+    let mut shared: HashMap<(PathBuf, *const ModeBasis), Arc<Surface>> = HashMap::new();
     let mut surfaces = Vec::new();
     let mut modal_files = Vec::new();
     for (body, selection) in &scene.flexible {
@@ -25,13 +27,13 @@ pub fn plan(scene: &Scene, picture: bool) -> Result<OutputPlan, ModalFileError> 
             content_sha256: selection.content_sha256.clone(),
         });
         let has_stress = selection.file.stress_location()?.is_some();
-        let stress = has_stress && !selection.modes.is_empty() && (scene.stress.contains(body) || monitored(*body));
+        let stress = has_stress && selection.basis.mode_count() > 0 && (scene.stress.contains(body) || monitored(*body));
         if picture || stress {
-            let key = (selection.file.path().to_owned(), selection.modes.clone());
+            let key = (selection.file.path().to_owned(), Rc::as_ptr(&selection.basis));
             let surface = match shared.get(&key) {
                 Some(surface) => Arc::clone(surface),
                 None => {
-                    let surface = Arc::new(selection.file.read_surface(&selection.modes)?);
+                    let surface = Arc::new(selection.file.read_surface_in(&selection.basis)?);
                     shared.insert(key, Arc::clone(&surface));
                     surface
                 }
@@ -39,6 +41,7 @@ pub fn plan(scene: &Scene, picture: bool) -> Result<OutputPlan, ModalFileError> 
             surfaces.push(BodySurface { body: *body, surface, stress });
         }
     }
+    let truncation = if scene.truncation { truncation(scene, &surfaces)? } else { None };
     let box_of = |(k, size): (usize, &Option<[f64; 3]>)| {
         size.map(|size| {
             let body = &scene.system.bodies[k];
@@ -64,5 +67,21 @@ pub fn plan(scene: &Scene, picture: bool) -> Result<OutputPlan, ModalFileError> 
         monitors: scene.monitors.clone(),
         deformation_scale: scene.deformation_scale,
         audit: scene.audit,
+        truncation,
     })
+}
+
+/// The modes that `scene` leaves out, with their stress where that of their body is evaluated.
+fn truncation(scene: &Scene, surfaces: &[BodySurface]) -> Result<Option<TruncationPlan>, ModalFileError> {
+    let Some(modes) = scene.left_out_modes() else { return Ok(None) };
+    let stress_of = |surface: &BodySurface| {
+        let place = modes.bodies.iter().position(|left| left.body == surface.body).filter(|_| surface.stress);
+        let selection = scene.flexible.iter().find(|(body, _)| *body == surface.body);
+        let (Some(place), Some((_, selection))) = (place, selection) else { return Ok(None) };
+        let rest = ModeBasis { whole: Vec::new(), residual: modes.bodies[place].rest.clone() };
+        let stress = selection.file.read_surface_in(&rest)?.stress;
+        Ok(stress.map(|stress| (Arc::new(stress), place)))
+    };
+    let stress = surfaces.iter().map(stress_of).collect::<Result<_, ModalFileError>>()?;
+    Ok(Some(TruncationPlan { modes: Arc::new(modes), stress }))
 }

@@ -6,10 +6,12 @@ use super::evaluation::Evaluation;
 use super::frame::FrameEvaluator;
 use super::picture::Snapshot;
 use super::plan::{OutputPlan, PlanError};
-use super::report::{OutcomeRecord, RunReport, Written};
+use super::report::{OutcomeRecord, Peaks, RunReport, Truncation, Written};
 #[cfg(feature = "hdf5")]
 use super::results::ResultsWriter;
+use super::scales::plain;
 use super::tracker::Tracker;
+use super::truncation::TruncationGauge;
 use super::viewer::ViewerStream;
 use crate::integrate::{Flow, Observer, Outcome, Sample, Summary};
 #[cfg(feature = "hdf5")]
@@ -24,6 +26,7 @@ pub struct OutputSet<'s> {
     plan: OutputPlan,
     evaluator: FrameEvaluator,
     tracker: Tracker,
+    truncation: Option<TruncationGauge>,
     #[cfg(feature = "hdf5")]
     results: Option<ResultsWriter>,
     viewer: Option<ViewerStream>,
@@ -41,6 +44,7 @@ impl<'s> OutputSet<'s> {
             system,
             evaluator: FrameEvaluator::new(system, &plan),
             tracker: Tracker::new(system, &plan),
+            truncation: TruncationGauge::new(system, &plan),
             plan,
             #[cfg(feature = "hdf5")]
             results: None,
@@ -104,6 +108,10 @@ impl<'s> OutputSet<'s> {
         self.finish_results(summary);
         self.finish_viewer(summary);
         let end = summary.end.is_finite().then(|| Evaluation::of(self.system, &summary.end).ok()).flatten();
+        let truncation = self.truncation.as_ref().map(|gauge| gauge.report(self.system));
+        let peaks = self.tracker.peaks(self.system);
+        let mut warnings = self.tracker.warnings(self.system);
+        warnings.extend(truncation.as_ref().and_then(|t| truncation_warning(t, &peaks)));
         RunReport {
             simulated_s: summary.time,
             wall_s: wall.as_secs_f64(),
@@ -112,10 +120,11 @@ impl<'s> OutputSet<'s> {
             rejected_steps: summary.rejected,
             evaluations: summary.evaluations,
             errors: self.tracker.errors(summary.local_error),
-            peaks: self.tracker.peaks(self.system),
+            truncation,
+            peaks,
             end,
             left_out,
-            warnings: self.tracker.warnings(self.system),
+            warnings,
             exceedances: self.tracker.exceedances().to_vec(),
             files: self.written,
             outcome: OutcomeRecord::from(&summary.outcome),
@@ -146,9 +155,23 @@ impl<'s> OutputSet<'s> {
     }
 }
 
+/// Share of a peak from which what left-out modes change is worth a warning.
+const NOTABLE_TRUNCATION: f64 = 0.01;
+
+fn truncation_warning(truncation: &Truncation, peaks: &Peaks) -> Option<String> {
+    let (share, what) = truncation.worst(peaks).filter(|(share, _)| *share > NOTABLE_TRUNCATION)?;
+    Some(format!(
+        "the modes left out may change {what} by {} % of its peak; set residual_modes = true or retain more modes",
+        plain(100.0 * share)
+    ))
+}
+
 impl Observer for OutputSet<'_> {
     fn step(&mut self, step: &Sample<'_>) -> Flow {
         self.tracker.follow_step(step);
+        if let Some(gauge) = &mut self.truncation {
+            gauge.follow(step);
+        }
         Flow::Continue
     }
 
@@ -156,6 +179,9 @@ impl Observer for OutputSet<'_> {
         self.evaluator.evaluate(&self.plan, sample);
         let frame = &self.evaluator.frame;
         self.tracker.follow(&self.plan, sample, frame);
+        if let Some(gauge) = &mut self.truncation {
+            gauge.observe(&self.plan, sample, frame);
+        }
         #[cfg(feature = "hdf5")]
         if let Some(results) = &mut self.results
             && let Err(error) = results.write(&self.plan, sample, frame)

@@ -106,20 +106,15 @@ fn softening(flexible: &FlexibleBody, j: usize, omega: &Vector3<f64>) -> f64 {
 
 fn warning(name: &str, flexible: &FlexibleBody, followed: &Followed) -> Option<String> {
     let percent = |share: &Share| plain(100.0 * share.value);
-    let mode = |share: &Share| flexible.mode_numbers.get(share.mode).copied().unwrap_or(share.mode + 1);
+    let mode = |share: &Share| flexible.mode_names.get(share.mode).map_or("?", String::as_str);
     let Followed { softening, left_out, .. } = followed;
     let runaway = if softening.value > 1.0 { ": deflections grow without bound" } else { "" };
     let spin = (softening.value > NOTABLE).then(|| {
-        format!(
-            "spin takes {} % of the stiffness of mode {} (t = {} s){runaway}",
-            percent(softening),
-            mode(softening),
-            plain(softening.time)
-        )
+        format!("spin takes {} % of the stiffness of {} (t = {} s){runaway}", percent(softening), mode(softening), plain(softening.time))
     });
     let unused = (left_out.value > NOTABLE).then(|| {
         format!(
-            "geometric stiffness, which is not used, would change that of mode {} by {} % (t = {} s)",
+            "geometric stiffness, which is not used, would change that of {} by {} % (t = {} s)",
             mode(left_out),
             percent(left_out),
             plain(left_out.time)

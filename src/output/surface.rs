@@ -52,14 +52,16 @@ impl Surface {
         }
     }
 
-    /// Von Mises stress (Pa) at the modal coordinates `eta`, handed to `each` by index; returns the largest with its place.
-    fn stress(&self, eta: &[f64], mut each: impl FnMut(usize, f64)) -> StressPeak {
+    /// Von Mises stress (Pa) at the modal coordinates `eta`, those of `others` with other modes added, handed to `each` by index; returns
+    /// the largest with its place.
+    fn stress(&self, eta: &[f64], others: Option<(&StressModes, &[f64])>, mut each: impl FnMut(usize, f64)) -> StressPeak {
         let Some(stress) = &self.stress else { return StressPeak::default() };
         let (mut peak, mut place) = (0.0_f64, 0);
         for start in (0..self.stress_count()).step_by(BLOCK) {
             let mut sum = [[0.0_f64; 6]; BLOCK];
             let count = BLOCK.min(self.stress_count() - start);
-            for (shape, eta) in stress.values.iter().zip(eta) {
+            let others = others.iter().flat_map(|(modes, eta)| modes.values.iter().zip(*eta));
+            for (shape, eta) in stress.values.iter().zip(eta).chain(others) {
                 for (sum, s) in sum.iter_mut().zip(shape.get(start..start + count).unwrap_or_default()) {
                     (0..6).for_each(|i| sum[i] += eta * f64::from(s[i]));
                 }
@@ -82,7 +84,13 @@ impl Surface {
     /// Largest von Mises stress at the modal coordinates `eta`.
     #[must_use]
     pub fn stress_peak(&self, eta: &[f64]) -> StressPeak {
-        self.stress(eta, |_, _| {})
+        self.stress(eta, None, |_, _| {})
+    }
+
+    /// Largest von Mises stress at the modal coordinates `eta` and those `xi` of other modes of the same surface.
+    #[must_use]
+    pub fn stress_peak_with(&self, eta: &[f64], others: &StressModes, xi: &[f64]) -> StressPeak {
+        self.stress(eta, Some((others, xi)), |_, _| {})
     }
 
     /// Von Mises stress (Pa) per point at the modal coordinates `eta`; of the values per triangle, each point takes the largest around
@@ -93,14 +101,14 @@ impl Surface {
                 out.fill(0.0);
                 StressPeak::default()
             }
-            Some(StressPlace::Node) => self.stress(eta, |i, value| {
+            Some(StressPlace::Node) => self.stress(eta, None, |i, value| {
                 if let Some(out) = out.get_mut(i) {
                     *out = value as f32;
                 }
             }),
             Some(StressPlace::Triangle) => {
                 out.fill(0.0);
-                self.stress(eta, |i, value| {
+                self.stress(eta, None, |i, value| {
                     for &node in &self.triangles[i] {
                         if let Some(out) = out.get_mut(node as usize) {
                             *out = out.max(value as f32);

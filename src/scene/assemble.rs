@@ -9,6 +9,8 @@ use super::spec::{BodySpec, FunctionSpec, HingeSpec, LoadSpec, MonitorSpec, Numb
 use crate::dynamics::closed_chain::assembly;
 use crate::integrate::simulate::Method;
 use crate::model::build::{BodyDefinition, BodyDefinitionKind, Definition, Frame, HingeDefinition, LoadDefinition, PointDefinition};
+#[cfg(feature = "hdf5")]
+use crate::model::left_out::{LeftOut, LeftOutModes};
 use crate::model::{ClosureMethod, LoadAxes, State, System, TimeFunction};
 use nalgebra::{Matrix3, Vector3};
 use std::path::Path;
@@ -20,6 +22,10 @@ pub struct Overrides {
     pub integrator: Option<String>,
     /// Retain the lowest N modes of every flexible body.
     pub modes: Option<usize>,
+    /// Add residual modes to every flexible body that leaves modes out, or to none.
+    pub residual_modes: Option<bool>,
+    /// Use the geometric stiffness of every flexible body whose modal file has it, or of none.
+    pub geometric_stiffness: Option<bool>,
     /// Flexible bodies to make rigid.
     pub rigid: Vec<String>,
     /// Simulated time (s).
@@ -89,6 +95,8 @@ pub struct Scene {
     pub stress: Vec<usize>,
     /// Whether output times are audited.
     pub audit: bool,
+    /// Whether the effect of modes that are left out is estimated.
+    pub truncation: bool,
     /// Limits.
     pub monitors: Vec<Monitor>,
     /// Factor on deformations in the picture.
@@ -100,6 +108,12 @@ pub struct Scene {
     pub flexible: Vec<(usize, super::modal_files::Selection)>,
     /// What the scene does not need or was told to leave out.
     pub left_out: Vec<String>,
+    /// What the command line changed.
+    #[cfg(feature = "hdf5")]
+    overrides: Overrides,
+    /// Modal files read so far.
+    #[cfg(feature = "hdf5")]
+    files: super::modal_files::ModalFiles,
 }
 
 impl Scene {
@@ -111,6 +125,34 @@ impl Scene {
             settings::Accuracy::Step(step) => (self.control, Some(step)),
         };
         settings::named(integrator, &control, step, &self.system, self.rate_hz).map(|(method, _)| method)
+    }
+
+    /// The modes that the scene leaves out, beside the system with all of them, its inertia that of the undeformed bodies; none if none are, or if the scene cannot be assembled
+    /// with all modes.
+    #[cfg(feature = "hdf5")]
+    #[must_use]
+    pub fn left_out_modes(&self) -> Option<LeftOutModes> {
+        if self.flexible.iter().all(|(_, selection)| selection.basis.is_complete()) {
+            return None;
+        }
+        let all = Overrides {
+            modes: Some(usize::MAX),
+            residual_modes: Some(false),
+            // an estimate to first order needs no inertia that follows the deformation, and no n^2 terms
+            inertia_order: Some(0),
+            geometric_stiffness: Some(false),
+            closure_method: Some(ClosureMethod::TreeAugmented.name().to_owned()),
+            ..self.overrides.clone()
+        };
+        let scene = assemble_with(self.source.clone(), &all, self.files.clone()).ok()?;
+        let left_out = self.flexible.iter().filter_map(|(body, selection)| {
+            let flexible = scene.system.bodies[*body].flexible()?;
+            // a body that is made rigid stays so
+            let fits = flexible.mode_count() == selection.basis.available() && !selection.basis.is_complete();
+            fits.then(|| LeftOut::new(*body, &selection.all, &selection.basis, flexible))
+        });
+        let bodies: Vec<_> = left_out.collect();
+        (!bodies.is_empty()).then_some(LeftOutModes { bodies, system: scene.system })
     }
 }
 
@@ -128,6 +170,20 @@ pub fn load(path: &Path, overrides: &Overrides) -> Result<Scene, SceneError> {
 /// # Errors
 /// As [`load`].
 pub fn assemble(source: Source, overrides: &Overrides) -> Result<Scene, SceneError> {
+    assemble_with(source, overrides, Files::default())
+}
+
+#[cfg(feature = "hdf5")]
+type Files = super::modal_files::ModalFiles;
+/// No modal files without the feature.
+#[cfg(not(feature = "hdf5"))]
+#[derive(Default)]
+struct Files;
+
+/// As [`assemble`], with the modal files `files` already read.
+fn assemble_with(source: Source, overrides: &Overrides, files: Files) -> Result<Scene, SceneError> {
+    #[cfg(not(feature = "hdf5"))]
+    let Files = files;
     let spec: SceneSpec = toml::from_str(&source.text)
         .map_err(|e| SceneError::Syntax { path: source.path.clone(), message: e.to_string().trim_end().to_owned() })?;
     if let Some(at) = first_not_finite(&source.text) {
@@ -140,7 +196,7 @@ pub fn assemble(source: Source, overrides: &Overrides) -> Result<Scene, SceneErr
         overrides,
         left_out: Vec::new(),
         #[cfg(feature = "hdf5")]
-        files: super::modal_files::ModalFiles::default(),
+        files,
         #[cfg(feature = "hdf5")]
         chosen: Vec::new(),
     };
@@ -148,7 +204,7 @@ pub fn assemble(source: Source, overrides: &Overrides) -> Result<Scene, SceneErr
     let (system, mut state) = definition.build().map_err(|e| source.model(&e))?;
     assembly::assemble(&system, &mut state)
         .map_err(|e| source.value(&[Step::Key("closure"), Step::Index(e.closure), Step::Key("name")], e.to_string()))?;
-    let Assembly { mut left_out, .. } = assembly;
+    let mut left_out = std::mem::take(&mut assembly.left_out);
 
     if !(spec.output.rate_hz > 0.0) {
         return Err(source.value(&[Step::Key("output"), Step::Key("rate_hz")], format!("{} must be positive", spec.output.rate_hz)));
@@ -178,6 +234,10 @@ pub fn assemble(source: Source, overrides: &Overrides) -> Result<Scene, SceneErr
         boxes[k] = body.box_size;
     }
     describe_left_out(&spec, &system, [hinges.len(), closures.len()], &mut left_out);
+    #[cfg(feature = "hdf5")]
+    if !spec.output.truncation && assembly.chosen.iter().any(|(_, selection)| !selection.basis.is_complete()) {
+        left_out.push("estimate of what left-out modes change".into());
+    }
     let name =
         spec.name.clone().unwrap_or_else(|| source.path.file_stem().map_or_else(|| "scene".into(), |s| s.to_string_lossy().into_owned()));
     #[cfg(feature = "hdf5")]
@@ -195,12 +255,17 @@ pub fn assemble(source: Source, overrides: &Overrides) -> Result<Scene, SceneErr
         closures,
         stress,
         audit: spec.output.audit,
+        truncation: spec.output.truncation,
         monitors,
         deformation_scale: spec.viewer.deformation_scale,
         boxes,
         #[cfg(feature = "hdf5")]
         flexible,
         left_out,
+        #[cfg(feature = "hdf5")]
+        overrides: overrides.clone(),
+        #[cfg(feature = "hdf5")]
+        files: assembly.files,
         source,
     })
 }
@@ -325,7 +390,7 @@ impl Assembly<'_> {
     fn definition(&mut self, spec: &SceneSpec) -> Result<Definition, SceneError> {
         let mut definition = Definition { gravity: Vector3::from(spec.gravity), ..Definition::default() };
         for (index, body) in spec.body.iter().enumerate() {
-            let kind = self.body(index, body)?;
+            let kind = self.body(index, body, spec)?;
             definition.bodies.push(BodyDefinition { name: body.name.clone(), kind });
         }
         for (index, hinge) in spec.hinge.iter().enumerate() {
@@ -340,12 +405,13 @@ impl Assembly<'_> {
         Ok(definition)
     }
 
-    fn body(&mut self, index: usize, body: &BodySpec) -> Result<BodyDefinitionKind, SceneError> {
+    fn body(&mut self, index: usize, body: &BodySpec, spec: &SceneSpec) -> Result<BodyDefinitionKind, SceneError> {
         let at = |key| [Step::Key("body"), Step::Index(index), Step::Key(key)];
         let rigid_keys =
             [("mass", body.mass.is_some()), ("center_of_mass", body.center_of_mass.is_some()), ("inertia", body.inertia.is_some())];
         let flexible_keys = [
             ("modes", body.modes.is_some()),
+            ("residual_modes", body.residual_modes.is_some()),
             ("damping_ratio", body.damping_ratio.is_some()),
             ("inertia_order", body.inertia_order.is_some()),
             ("geometric_stiffness", body.geometric_stiffness.is_some()),
@@ -366,7 +432,7 @@ impl Assembly<'_> {
             return Err(self.source.value(&at("box"), format!("{size:?} must be three positive lengths")));
         }
         match &body.modal_file {
-            Some(file) => self.flexible(index, body, file),
+            Some(file) => self.flexible(index, body, file, spec),
             None => {
                 let Some(mass) = body.mass else {
                     let message = format!("body \"{}\" needs mass and inertia (rigid) or modal_file (flexible)", body.name);
@@ -383,7 +449,7 @@ impl Assembly<'_> {
     }
 
     #[cfg(not(feature = "hdf5"))]
-    fn flexible(&mut self, index: usize, _body: &BodySpec, _file: &Path) -> Result<BodyDefinitionKind, SceneError> {
+    fn flexible(&mut self, index: usize, _body: &BodySpec, _file: &Path, _spec: &SceneSpec) -> Result<BodyDefinitionKind, SceneError> {
         Err(self.source.value(
             &[Step::Key("body"), Step::Index(index), Step::Key("modal_file")],
             "this build reads no modal files; build with the feature \"hdf5\"",

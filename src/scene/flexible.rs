@@ -3,39 +3,61 @@
 use super::assemble::Assembly;
 use super::error::SceneError;
 use super::locate::Step;
-use super::modal_files::Selection;
-use super::spec::{BodySpec, ModesRule, ModesSpec, Numbers};
+use super::modal_files::{BasisError, Choice, Places, Selection};
+use super::spec::{BodySpec, ModesRule, ModesSpec, Numbers, SceneSpec};
 use crate::model::InertiaOrder;
 use crate::model::build::{BodyDefinitionKind, FlexibleDefinition, PointDefinition};
-use nalgebra::{Vector3, Vector6};
+use nalgebra::Vector6;
 use std::path::Path;
 
 impl Assembly<'_> {
-    pub(super) fn flexible(&mut self, index: usize, body: &BodySpec, file: &Path) -> Result<BodyDefinitionKind, SceneError> {
+    pub(super) fn flexible(
+        &mut self,
+        index: usize,
+        body: &BodySpec,
+        file: &Path,
+        spec: &SceneSpec,
+    ) -> Result<BodyDefinitionKind, SceneError> {
         let steps = [Step::Key("body"), Step::Index(index), Step::Key("modal_file")];
         let path = self.source.path.parent().unwrap_or(Path::new("")).join(file);
         let (handle, full, content_sha256) = self.files.open(&path, self.source, &steps)?;
-        let modes = retained(self, index, body, &full.frequency_hz)?;
-        if modes.len() < full.mode_count() {
-            self.left_out.push(format!("{} of {} modes of \"{}\"", full.mode_count() - modes.len(), full.mode_count(), body.name));
+        let whole = retained(self, index, body, &full.frequency_hz)?;
+        let residual = self.residual(body, &whole, full.mode_count()).then(|| places(body, &full.root_interface, spec));
+        let choice = Choice { whole, residual };
+        let basis = self.files.basis(&path, &handle, &full, &choice).map_err(|error| {
+            let steps = [Step::Key("body"), Step::Index(index), Step::Key("residual_modes")];
+            match error {
+                BasisError::File(source) => SceneError::ModalFile { path: self.source.path.clone(), at: self.source.at(&steps), source },
+                BasisError::Residual(_) => self.source.value(&steps, error.to_string()),
+            }
+        })?;
+        let count = basis.mode_count();
+        if !basis.is_complete() {
+            let carried = if basis.has_residual() { format!(" ({} residual modes added)", basis.residual.ncols()) } else { String::new() };
+            let (left, all) = (full.mode_count() - basis.whole.len(), full.mode_count());
+            self.left_out.push(format!("{left} of {all} modes of \"{}\"{carried}", body.name));
         }
         let order = inertia_order(self, index, body)?;
         let geometric = self.geometric_stiffness(index, body, full.geometric_stiffness.is_some(), order)?;
-        let (modal, integrals) = self.files.pack(&path, &full, &modes, geometric);
+        let (modal, integrals) = self.files.pack(&path, &full, &choice, &basis, geometric);
+        // a list gives the ratios of the scene's own choice of modes; others keep those of the file
+        let of_file = |from: usize| modal.damping_ratio.iter().copied().skip(from);
         let damping_ratio = match &body.damping_ratio {
             None => modal.damping_ratio.clone(),
-            Some(Numbers::One(z)) => vec![*z; modes.len()],
+            Some(Numbers::One(z)) => vec![*z; count],
             // a list for the scene's own choice of modes still fits when an override retains fewer
-            Some(Numbers::Many(list)) if self.overrides.modes.is_some() || modes.is_empty() => {
-                list.iter().copied().take(modes.len()).collect()
+            Some(Numbers::Many(list)) if self.overrides.modes.is_some() || count == 0 => {
+                let given = list.len().min(basis.whole.len());
+                list.iter().copied().take(given).chain(of_file(given)).collect()
             }
+            Some(Numbers::Many(list)) if list.len() == basis.whole.len() => list.iter().copied().chain(of_file(list.len())).collect(),
             Some(Numbers::Many(list)) => list.clone(),
         };
         let start = |given: &[f64]| {
             let mut start = given.to_vec();
-            // modes that an override adds start at rest
-            if self.is_overridden(body) && !start.is_empty() {
-                start.resize(modes.len(), 0.0);
+            // modes that an override adds start at rest, and so do residual modes
+            if !start.is_empty() && (self.is_overridden(body) || start.len() == basis.whole.len()) {
+                start.resize(count, 0.0);
             }
             start
         };
@@ -44,18 +66,18 @@ impl Assembly<'_> {
             order,
             modal_position: start(&body.modal_position),
             modal_velocity: start(&body.modal_velocity),
-            mode_numbers: modes.iter().map(|m| m + 1).collect(),
+            mode_names: basis.names(),
             modal,
             integrals,
         };
-        self.chosen.push((index, Selection { file: handle, modes, content_sha256 }));
+        self.chosen.push((index, Selection { file: handle, all: full, basis, content_sha256 }));
         Ok(BodyDefinitionKind::Flexible(definition))
     }
 
     /// Whether the body uses geometric stiffness; `held` tells that the file has it.
     fn geometric_stiffness(&mut self, index: usize, body: &BodySpec, held: bool, order: InertiaOrder) -> Result<bool, SceneError> {
         let steps = [Step::Key("body"), Step::Index(index), Step::Key("geometric_stiffness")];
-        let wanted = body.geometric_stiffness.unwrap_or(false);
+        let wanted = self.overrides.geometric_stiffness.map_or(body.geometric_stiffness.unwrap_or(false), |on| on && held);
         if wanted && !held {
             let message =
                 "true, but the modal file has no geometric stiffness; write the file with geometric/stiffness or leave the key out";
@@ -75,6 +97,12 @@ impl Assembly<'_> {
         Ok(wanted)
     }
 
+    /// Whether residual modes stand in for the modes that `whole` leaves out.
+    fn residual(&self, body: &BodySpec, whole: &[usize], available: usize) -> bool {
+        let wanted = self.overrides.residual_modes.or(body.residual_modes).unwrap_or(false);
+        wanted && whole.len() < available && !self.overrides.rigid.contains(&body.name)
+    }
+
     fn is_overridden(&self, body: &BodySpec) -> bool {
         self.overrides.modes.is_some() || self.overrides.rigid.contains(&body.name)
     }
@@ -86,15 +114,28 @@ impl Assembly<'_> {
         };
         let wrap = |source| SceneError::ModalFile { path: self.source.path.clone(), at: self.source.at(&steps), source };
         let position = selection.file.node_position(node).map_err(wrap)?;
-        let displacement = selection.file.node_displacement(node).map_err(wrap)?;
-        let rotation = selection.file.node_rotation(node).map_err(wrap)?;
-        let shape = |&mode: &usize| {
-            let turn = rotation.as_ref().map_or_else(Vector3::zeros, |r| r[mode]);
-            let move_ = displacement[mode];
-            Vector6::new(turn.x, turn.y, turn.z, move_.x, move_.y, move_.z)
-        };
-        Ok(PointDefinition::Node { position, mode_shape: selection.modes.iter().map(shape).collect(), rotations: rotation.is_some() })
+        let shape = selection.file.node_shape(node).map_err(wrap)?;
+        let mode_shape = selection.basis.combine(&shape, Vector6::zeros());
+        Ok(PointDefinition::Node { position, mode_shape, rotations: selection.file.has_rotation() })
     }
+}
+
+/// Where the scene attaches something to `body`, or loads it.
+fn places(body: &BodySpec, root_interface: &str, spec: &SceneSpec) -> Places {
+    let on = |name: &str, node: &Option<String>| if name == body.name { node.clone() } else { None };
+    let inboard = spec.hinge.iter().filter(|h| h.child == body.name);
+    let inboard = inboard.map(|h| h.child_node.clone().unwrap_or_else(|| root_interface.to_owned()));
+    let outboard = spec.hinge.iter().filter_map(|h| on(&h.parent, &h.parent_node));
+    let a = spec.closure.iter().filter_map(|c| on(c.body_a.as_deref()?, &c.node_a));
+    let b = spec.closure.iter().filter_map(|c| on(c.body_b.as_deref()?, &c.node_b));
+    let loads = spec.load.iter().filter_map(|l| on(&l.body, &l.node));
+    let mut interfaces: Vec<_> = inboard.chain(outboard).chain(a).chain(b).chain(loads).collect();
+    let mut nodes: Vec<_> = spec.load.iter().filter(|l| l.body == body.name).filter_map(|l| l.mesh_node).collect();
+    interfaces.sort();
+    interfaces.dedup();
+    nodes.sort_unstable();
+    nodes.dedup();
+    Places { interfaces, nodes }
 }
 
 /// 0-based numbers of the modes that the scene and the command line retain.

@@ -3,8 +3,10 @@
 use super::error::{SceneError, Source};
 use super::locate::Step;
 use crate::io::{ModalFile, ModalFileError};
+use crate::model::ModeBasis;
 use crate::model::flexible_body::ModalIntegrals;
 use crate::model::modal_body::ModalBody;
+use crate::model::mode_basis::{NoStaticAnswer, interface_loads, shape_loads};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
@@ -15,8 +17,10 @@ use std::sync::Arc;
 pub struct Selection {
     /// The file, for surfaces and nodes.
     pub file: Rc<ModalFile>,
-    /// 0-based numbers of the retained modes.
-    pub modes: Vec<usize>,
+    /// Modal integrals of all modes of the file.
+    pub all: Rc<ModalBody>,
+    /// The retained modes.
+    pub basis: Rc<ModeBasis>,
     /// The file's content digest.
     pub content_sha256: String,
 }
@@ -25,10 +29,40 @@ pub struct Selection {
 type Packed = (Arc<ModalBody>, Arc<ModalIntegrals>);
 
 /// Files and selections read so far.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub struct ModalFiles {
     files: HashMap<PathBuf, (Rc<ModalFile>, Rc<ModalBody>, String)>,
-    packed: HashMap<(PathBuf, Vec<usize>, bool), Packed>,
+    bases: HashMap<(PathBuf, Choice), Rc<ModeBasis>>,
+    packed: HashMap<(PathBuf, Choice, bool), Packed>,
+}
+
+/// A choice of modes of one file.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, Default)]
+pub struct Choice {
+    /// 0-based numbers of the modes retained whole.
+    pub whole: Vec<usize>,
+    /// Where loads act that residual modes shall carry beside inertial loads; no residual modes if none.
+    pub residual: Option<Places>,
+}
+
+/// Interfaces and mesh nodes of a body where something is attached, sorted.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, Default)]
+pub struct Places {
+    /// Names of interfaces.
+    pub interfaces: Vec<String>,
+    /// Numbers of mesh nodes.
+    pub nodes: Vec<usize>,
+}
+
+/// Why a choice of modes has no basis.
+#[derive(Debug, thiserror::Error)]
+pub enum BasisError {
+    /// A node that cannot be read.
+    #[error(transparent)]
+    File(#[from] ModalFileError),
+    /// No residual modes.
+    #[error("true, but {0}; correct modes/stiffness or modes/frequency in the modal file, or leave the key out")]
+    Residual(#[from] NoStaticAnswer),
 }
 
 impl ModalFiles {
@@ -45,10 +79,35 @@ impl ModalFiles {
         Ok(entry)
     }
 
-    /// The body with the modes `modes` (0-based), packed with or without its geometric stiffness.
-    pub fn pack(&mut self, path: &Path, body: &ModalBody, modes: &[usize], geometric: bool) -> Packed {
-        let entry = self.packed.entry((path.to_owned(), modes.to_vec(), geometric)).or_insert_with(|| {
-            let selected = body.with_modes(modes);
+    /// The combinations of modes that `choice` asks for.
+    ///
+    /// # Errors
+    /// If a node has no shape, or static loads no answer.
+    pub fn basis(&mut self, path: &Path, file: &ModalFile, body: &ModalBody, choice: &Choice) -> Result<Rc<ModeBasis>, BasisError> {
+        let key = (path.to_owned(), choice.clone());
+        if let Some(found) = self.bases.get(&key) {
+            return Ok(Rc::clone(found));
+        }
+        let basis = match &choice.residual {
+            None => ModeBasis::whole(choice.whole.clone(), body.mode_count()),
+            Some(places) => {
+                let interfaces = places.interfaces.iter().filter_map(|name| body.interface(name));
+                let mut loads: Vec<_> = interfaces.flat_map(interface_loads).collect();
+                for &node in &places.nodes {
+                    loads.extend(shape_loads(&file.node_shape(node)?));
+                }
+                ModeBasis::with_residual(body, choice.whole.clone(), &loads)?
+            }
+        };
+        let basis = Rc::new(basis);
+        self.bases.insert(key, Rc::clone(&basis));
+        Ok(basis)
+    }
+
+    /// The body with the modes `basis` of `choice`, packed with or without its geometric stiffness.
+    pub fn pack(&mut self, path: &Path, body: &ModalBody, choice: &Choice, basis: &ModeBasis, geometric: bool) -> Packed {
+        let entry = self.packed.entry((path.to_owned(), choice.clone(), geometric)).or_insert_with(|| {
+            let selected = body.with_basis(basis);
             let pack = if geometric { ModalIntegrals::with_geometric_stiffness } else { ModalIntegrals::of };
             let integrals = pack(&selected);
             (Arc::new(selected), Arc::new(integrals))

@@ -138,6 +138,8 @@ pub struct BodySpec {
     pub modal_file: Option<PathBuf>,
     /// Retained modes; all if none.
     pub modes: Option<ModesSpec>,
+    /// Add residual modes that answer loads for the modes left out; not if none.
+    pub residual_modes: Option<bool>,
     /// Overrides the file.
     pub damping_ratio: Option<Numbers>,
     /// 0, 1 or 2.
@@ -341,6 +343,9 @@ pub struct OutputSpec {
     /// Whether every output time is audited by the Newton-Euler sweep.
     #[serde(default = "yes")]
     pub audit: bool,
+    /// Whether the effect of modes that are left out is estimated.
+    #[serde(default = "yes")]
+    pub truncation: bool,
 }
 
 const fn rate_hz() -> f64 {
@@ -353,7 +358,7 @@ const fn yes() -> bool {
 
 impl Default for OutputSpec {
     fn default() -> Self {
-        Self { rate_hz: rate_hz(), hinges: None, closures: None, stress: None, audit: true }
+        Self { rate_hz: rate_hz(), hinges: None, closures: None, stress: None, audit: true, truncation: true }
     }
 }
 

@@ -20,6 +20,10 @@ pub struct Request {
     pub steps: Vec<f64>,
     /// Retain the lowest N modes of every flexible body.
     pub modes: Vec<usize>,
+    /// Without residual modes for those left out, with them, or both.
+    pub residual_modes: Vec<bool>,
+    /// Without the geometric stiffness of the modal files, with it, or both.
+    pub geometric_stiffness: Vec<bool>,
     /// Orders of the inertia in the modal coordinates.
     pub orders: Vec<u8>,
     /// Methods for all closures.
@@ -57,6 +61,12 @@ pub enum RequestError {
 pub struct Variant {
     /// Lowest modes retained of every flexible body.
     pub modes: Option<usize>,
+    /// Residual modes for those left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub residual_modes: Option<bool>,
+    /// Geometric stiffness where the modal files have it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub geometric_stiffness: Option<bool>,
     /// Order of the inertia.
     pub inertia_order: Option<u8>,
     /// Method for all closures.
@@ -69,15 +79,22 @@ impl Variant {
     /// # Errors
     /// If it cannot be assembled.
     pub fn assemble(&self, source: &Source, duration: Option<f64>) -> Result<Scene, SceneError> {
-        let Self { modes, inertia_order, closure_method } = self.clone();
-        assemble::assemble(source.clone(), &Overrides { modes, inertia_order, closure_method, duration, ..Overrides::default() })
+        let Self { modes, residual_modes, geometric_stiffness, inertia_order, closure_method } = self.clone();
+        let changed = Overrides { modes, residual_modes, geometric_stiffness, inertia_order, closure_method, ..Overrides::default() };
+        assemble::assemble(source.clone(), &Overrides { duration, ..changed })
     }
 
     /// What is changed, in words; empty if nothing is.
     #[must_use]
     pub fn words(&self) -> String {
-        let words =
-            [self.modes.map(|n| format!("{n} modes")), self.inertia_order.map(|o| format!("order {o}")), self.closure_method.clone()];
+        let switched = |on: bool, what: &str| if on { format!("with {what}") } else { format!("without {what}") };
+        let words = [
+            self.modes.map(|n| format!("{n} modes")),
+            self.residual_modes.map(|on| switched(on, "residual modes")),
+            self.geometric_stiffness.map(|on| switched(on, "geometric stiffness")),
+            self.inertia_order.map(|o| format!("order {o}")),
+            self.closure_method.clone(),
+        ];
         words.into_iter().flatten().collect::<Vec<_>>().join(", ")
     }
 }
@@ -175,16 +192,14 @@ impl Grid {
             return Err(unfit("a study compares loads, and output.hinges and output.closures name none; name some or drop the keys"));
         }
         check_modes(source, request)?;
-        let mut variants = Vec::new();
-        for &modes in &options(&request.modes) {
-            for &inertia_order in &options(&request.orders) {
-                for closure_method in options(&request.closure_methods) {
-                    let variant = Variant { modes, inertia_order, closure_method };
-                    let scene = variant.assemble(source, request.duration)?;
-                    variants.push((variant, scene));
-                }
-            }
-        }
+        let mut all = vec![Variant::default()];
+        each(&mut all, &request.modes, |v, modes| v.modes = Some(modes));
+        each(&mut all, &request.residual_modes, |v, on| v.residual_modes = Some(on));
+        each(&mut all, &request.geometric_stiffness, |v, on| v.geometric_stiffness = Some(on));
+        each(&mut all, &request.orders, |v, order| v.inertia_order = Some(order));
+        each(&mut all, &request.closure_methods, |v, method| v.closure_method = Some(method));
+        let assembled = all.into_iter().map(|variant| Ok((variant.clone(), variant.assemble(source, request.duration)?)));
+        let variants = assembled.collect::<Result<_, SceneError>>()?;
         let mut grid = Self { base, variants, points: Vec::new(), notes: Vec::new() };
         let named = !request.integrators.is_empty();
         let integrators: Vec<&str> = match request.integrators.as_slice() {
@@ -232,9 +247,17 @@ impl Grid {
     }
 }
 
-/// One entry of none for an empty list.
-fn options<T: Clone>(list: &[T]) -> Vec<Option<T>> {
-    if list.is_empty() { vec![None] } else { list.iter().cloned().map(Some).collect() }
+/// Every variant with every value of `list` set; an empty list leaves them as they are.
+fn each<T: Clone>(variants: &mut Vec<Variant>, list: &[T], set: impl Fn(&mut Variant, T)) {
+    if list.is_empty() {
+        return;
+    }
+    let with = |variant: &Variant, value: &T| {
+        let mut changed = variant.clone();
+        set(&mut changed, value.clone());
+        changed
+    };
+    *variants = variants.iter().flat_map(|v| list.iter().map(move |value| (v, value))).map(|(v, value)| with(v, value)).collect();
 }
 
 fn descending(list: &[f64]) -> Vec<f64> {
@@ -283,7 +306,13 @@ fn check(base: &Scene, request: &Request) -> Result<(), RequestError> {
         return fault("--orders", format!("{x} must be 0, 1 or 2"));
     }
     let flexible = base.system.bodies.iter().any(|b| b.flexible().is_some());
-    for (option, given) in [("--modes", !request.modes.is_empty()), ("--orders", !request.orders.is_empty())] {
+    let of_modes = [
+        ("--modes", !request.modes.is_empty()),
+        ("--residual-modes", !request.residual_modes.is_empty()),
+        ("--geometric-stiffness", !request.geometric_stiffness.is_empty()),
+        ("--orders", !request.orders.is_empty()),
+    ];
+    for (option, given) in of_modes {
         if given && !flexible {
             return fault(option, "the scene has no flexible body; leave it out".into());
         }
@@ -298,6 +327,8 @@ fn check(base: &Scene, request: &Request) -> Result<(), RequestError> {
     twice("--tolerances", &request.tolerances)?;
     twice("--steps", &request.steps)?;
     twice("--modes", &request.modes)?;
+    twice("--residual-modes", &request.residual_modes)?;
+    twice("--geometric-stiffness", &request.geometric_stiffness)?;
     twice("--orders", &request.orders)?;
     twice("--closure-method", &request.closure_methods)
 }

@@ -65,7 +65,14 @@ impl Candidates {
         let tightest = grid.points.iter().filter_map(|p| p.tolerance).reduce(f64::min);
         let tolerance = tightest.map_or(WITHOUT_TOLERANCES, |t| (TIGHTER * t).max(TIGHTEST));
         let flexible = base.system.bodies.iter().any(|b| b.flexible().is_some());
-        let full = Variant { modes: flexible.then_some(usize::MAX), inertia_order: flexible.then_some(2), closure_method: None };
+        // as much as any point has
+        let stiffens = grid.variants.iter().any(|(v, _)| v.geometric_stiffness == Some(true));
+        let full = Variant {
+            modes: flexible.then_some(usize::MAX),
+            inertia_order: flexible.then_some(2),
+            geometric_stiffness: stiffens.then_some(true),
+            ..Variant::default()
+        };
         let words = if flexible { ", all modes" } else { "" };
         let assemble = |variant: &Variant| variant.assemble(&base.source, base.duration);
         let mut scenes = Vec::new();

@@ -163,6 +163,8 @@ impl StudyReport {
             "tolerance",
             "step",
             "modes",
+            "residual_modes",
+            "geometric_stiffness",
             "inertia_order",
             "closure_method",
             "retained_modes",
@@ -189,6 +191,8 @@ impl StudyReport {
                 text(some(p.point.tolerance.as_ref())),
                 text(some(p.point.step.as_ref())),
                 text(some(p.point.variant.modes.as_ref())),
+                text(some(p.point.variant.residual_modes.as_ref())),
+                text(some(p.point.variant.geometric_stiffness.as_ref())),
                 text(some(p.point.variant.inertia_order.as_ref())),
                 text(some(p.point.variant.closure_method.as_ref())),
                 p.retained_modes.to_string(),
@@ -226,10 +230,15 @@ fn scene_lines(scene: &Scene, point: &Point) -> Vec<String> {
         Accuracy::Step(step) => lines.push(format!("step = {step:e}")),
     }
     let variant = &point.variant;
-    if variant.modes.is_some() || variant.inertia_order.is_some() {
+    let of_bodies = [
+        variant.modes.map(|n| format!("modes = {{ count = {n} }}")),
+        variant.residual_modes.map(|on| format!("residual_modes = {on}")),
+        variant.geometric_stiffness.map(|on| format!("geometric_stiffness = {on}")),
+        variant.inertia_order.map(|o| format!("inertia_order = {o}")),
+    ];
+    if of_bodies.iter().any(Option::is_some) {
         lines.push("# in each flexible [[body]]".into());
-        lines.extend(variant.modes.map(|n| format!("modes = {{ count = {n} }}")));
-        lines.extend(variant.inertia_order.map(|o| format!("inertia_order = {o}")));
+        lines.extend(of_bodies.into_iter().flatten());
     }
     if let Some(method) = &variant.closure_method {
         lines.push("# in each [[closure]]".into());
@@ -247,7 +256,7 @@ fn short(value: f64) -> String {
 /// What else could go: the fewest modes and the lowest inertia order that some point within the budget has.
 fn proposals(points: &[PointReport], figures: &[Figures], budget: f64) -> Vec<String> {
     let mut proposals = Vec::new();
-    let mut of = |what: &str, value: &dyn Fn(&PointReport) -> Option<usize>| {
+    let mut of = |what: &str, named: &dyn Fn(usize) -> String, value: &dyn Fn(&PointReport) -> Option<usize>| {
         let mut values: Vec<usize> = points.iter().filter_map(value).collect();
         values.sort_unstable();
         values.dedup();
@@ -258,17 +267,21 @@ fn proposals(points: &[PointReport], figures: &[Figures], budget: f64) -> Vec<St
             format!("{:.2e} s, error {:.2} % with {}", cost, 100.0 * error, points[i].point.words())
         };
         let Some((least, index)) = values.iter().find_map(|&v| Some((v, best(v)?))) else {
-            proposals.push(format!("{what}: none of {values:?} meets {} % at any accuracy that was run", 100.0 * budget));
+            let all = values.iter().map(|&v| named(v)).collect::<Vec<_>>().join(", ");
+            proposals.push(format!("{what}: none of {all} meets {} % at any accuracy that was run", 100.0 * budget));
             return;
         };
         if least == most {
-            proposals.push(format!("{what}: fewer than {most} do not meet {} % at any accuracy that was run", 100.0 * budget));
+            proposals.push(format!("{what}: less than {} does not meet {} % at any accuracy that was run", named(most), 100.0 * budget));
             return;
         }
         let against = best(most).map_or_else(|| "does not meet it".to_owned(), |i| format!("costs {}", words(i)));
-        proposals.push(format!("{what}: {least} is enough ({}); {most} {against}", words(index)));
+        proposals.push(format!("{what}: {} is enough ({}); {} {against}", named(least), words(index), named(most)));
     };
-    of("modes per body", &|p| p.point.variant.modes);
-    of("inertia order", &|p| p.point.variant.inertia_order.map(usize::from));
+    let number = |n: usize| n.to_string();
+    let switch = |on: usize| if on == 0 { "off".to_owned() } else { "on".to_owned() };
+    of("modes per body", &number, &|p| p.point.variant.modes);
+    of("geometric stiffness", &switch, &|p| p.point.variant.geometric_stiffness.map(usize::from));
+    of("inertia order", &number, &|p| p.point.variant.inertia_order.map(usize::from));
     proposals
 }

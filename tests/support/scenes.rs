@@ -34,7 +34,7 @@ pub fn flexible(name: &str, modal: ModalBody) -> BodyDefinition {
     let n = modal.mode_count();
     let kind = BodyDefinitionKind::Flexible(FlexibleDefinition {
         integrals: Arc::new(ModalIntegrals::of(&modal)),
-        mode_numbers: (1..=n).collect(),
+        mode_names: (1..=n).map(|i| format!("mode {i}")).collect(),
         damping_ratio: modal.damping_ratio.clone(),
         order: InertiaOrder::Second,
         modal_position: vec![],

@@ -114,7 +114,7 @@ fn flexible_kind(rng: &mut StdRng, recipe: &Recipe) -> BodyDefinitionKind {
     BodyDefinitionKind::Flexible(FlexibleDefinition {
         integrals: Arc::new(ModalIntegrals::with_geometric_stiffness(&modal)),
         modal: Arc::new(modal),
-        mode_numbers: (1..=n).collect(),
+        mode_names: (1..=n).map(|i| format!("mode {i}")).collect(),
         damping_ratio: vec![if recipe.dampers { 0.02 } else { 0.0 }; n],
         order: recipe.order,
         modal_position: numbers(rng, n, 0.15),

@@ -29,6 +29,15 @@ pub struct BodyForce {
     pub alpha_inboard: Vector6<f64>,
 }
 
+/// Forces on bodies and modes beside those of the system's loads.
+#[derive(Debug, Clone)]
+pub struct AddedForces {
+    /// On the rigid rows of each body, in the recursion's frame.
+    pub external: Vec<Vector6<f64>>,
+    /// On the modes, indexed like the modal coordinates.
+    pub modal: Vec<f64>,
+}
+
 /// What the force sweep writes.
 #[derive(Debug, Clone)]
 pub struct ForceScratch {
@@ -42,6 +51,8 @@ pub struct ForceScratch {
     pub nu_modal: Vec<f64>,
     /// Hinge forces of springs, dampers and motors, indexed like the hinge rates.
     pub applied: Vec<f64>,
+    /// Added to the external forces at every sweep; none unless room was made for it.
+    pub added: Option<AddedForces>,
     /// One per aggregate.
     pub aggregates: Vec<AggregateForce>,
     /// World frames of the bodies; empty unless a load is given in inertial axes.
@@ -69,10 +80,18 @@ impl ForceScratch {
             external_modal: vec![0.0; if loaded || closed { system.modal_count } else { 0 }],
             nu_modal: vec![0.0; system.modal_count],
             applied: vec![0.0; system.velocity_count],
+            added: None,
             aggregates: system.aggregates.iter().map(AggregateForce::new).collect(),
             world: vec![WorldFrame::default(); if system.has_world_loads() { system.bodies.len() } else { 0 }],
             shape: vec![Vector6::zeros(); if loaded { system.largest_mode_count() } else { 0 }],
         }
+    }
+
+    /// Room for forces that are added to those of the loads; zero at first.
+    pub fn make_room_for_added(&mut self, system: &System) {
+        self.external.resize(system.bodies.len(), Vector6::zeros());
+        self.external_modal.resize(system.modal_count, 0.0);
+        self.added = Some(AddedForces { external: self.external.clone(), modal: self.external_modal.clone() });
     }
 }
 
@@ -130,6 +149,10 @@ pub fn gather_applied(system: &System, state: &State, pose: &PoseScratch, out: &
     // closures add their forces after the free pass, so that these start anew in every evaluation
     out.external.fill(Vector6::zeros());
     out.external_modal.fill(0.0);
+    if let Some(added) = &out.added {
+        out.external.copy_from_slice(&added.external);
+        out.external_modal.copy_from_slice(&added.modal);
+    }
     if !system.loads.is_empty() {
         apply_loads(system, state, pose, out);
     }
