@@ -4,7 +4,7 @@ use super::failure::Failure;
 use super::report::{Align, Table, number};
 use crate::output::RunReport;
 use crate::output::evaluation::Named;
-use crate::output::report::{LoadPeak, TruncationFigures, share};
+use crate::output::report::{LoadPeak, TimeRecord, TruncationFigures, share};
 use crate::study::verify::{LoadDifference, Verification};
 use std::io::Write;
 
@@ -73,13 +73,17 @@ pub fn write(scene: &str, report: &RunReport, output: &mut dyn Write) -> Result<
     let optional = |x: Option<f64>| x.map_or_else(|| "-".to_owned(), |x| format!("{x:.1e}"));
     writeln!(
         output,
-        "\nerrors: energy balance {:.1e}, momentum {}, load audit {}, closure {}, step control {}",
+        "\nerrors: energy balance {:.1e}, momentum {}, load audit {}, closure {}, step control {} (of a load {})",
         report.errors.energy,
         optional(report.errors.momentum),
         optional(report.errors.audit),
         optional(report.errors.closure),
-        optional(report.errors.local)
+        optional(report.errors.local),
+        optional(report.errors.local_load)
     )?;
+    if let Some(time) = &report.time {
+        writeln!(output, "{}", time_line(time))?;
+    }
     for warning in &report.warnings {
         writeln!(output, "warning: {warning}")?;
     }
@@ -88,6 +92,30 @@ pub fn write(scene: &str, report: &RunReport, output: &mut dyn Write) -> Result<
         writeln!(output, "wrote {} {}: {} output times", file.kind, file.target, file.frames)?;
     }
     Ok(())
+}
+
+/// Where the time went, as one line.
+fn time_line(time: &TimeRecord) -> String {
+    let TimeRecord { per_evaluation_s, evaluations_s, outputs_s, integrator_s, sweeps } = time;
+    let whole = evaluations_s + outputs_s + integrator_s;
+    let percent = |part: f64, whole: f64| format!("{:.0} %", 100.0 * part / whole.max(1e-12));
+    let parts = [
+        (sweeps.poses, "poses"),
+        (sweeps.velocities, "velocities"),
+        (sweeps.inertias, "inertias"),
+        (sweeps.forces, "forces"),
+        (sweeps.accelerations, "accelerations"),
+        (sweeps.closures, "closures"),
+    ];
+    let parts: Vec<_> = parts.iter().filter(|(x, _)| *x > 0.0).map(|(x, what)| format!("{what} {}", percent(*x, 1.0))).collect();
+    format!(
+        "time: evaluations {} at {} us each ({}), outputs {}, integrator {}",
+        percent(*evaluations_s, whole),
+        number(1e6 * per_evaluation_s),
+        parts.join(", "),
+        percent(*outputs_s, whole),
+        percent(*integrator_s, whole)
+    )
 }
 
 /// Writes the differences from the tighter run.

@@ -50,6 +50,7 @@ pub mod frame_motion;
 pub mod hinge_load;
 pub mod inverse;
 pub mod modal_block;
+pub mod profile;
 pub mod sweep;
 pub mod world;
 

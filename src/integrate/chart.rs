@@ -5,6 +5,10 @@
 
 use crate::dynamics::{DynamicsError, Workspace, energy, forward_dynamics};
 use crate::model::{State, System};
+use std::time::{Duration, Instant};
+
+/// Evaluations from one that is timed to the next.
+const TIMED_EVERY: u64 = 16;
 
 /// Local problem: a base state and the map from y to states and rates.
 #[derive(Debug)]
@@ -19,6 +23,8 @@ pub struct Chart<'a> {
     pub work: f64,
     /// Evaluations so far.
     pub evaluations: u64,
+    /// Wall-clock time of those evaluations that were timed, and how many they are.
+    pub timed: (Duration, u32),
     /// How near the loops came to a change point since this was last set: all, and cut ones.
     pub nearest_rank_loss: [f64; 2],
     /// The last evaluation.
@@ -36,6 +42,7 @@ impl<'a> Chart<'a> {
             clock_rest: 0.0,
             work: 0.0,
             evaluations: 0,
+            timed: (Duration::ZERO, 0),
             nearest_rank_loss: [f64::INFINITY; 2],
             workspace: Workspace::new(system),
             state: start.clone(),
@@ -102,8 +109,13 @@ impl<'a> Chart<'a> {
     }
 
     fn rate_at(&mut self, state: &State, y: &[f64], rate: &mut [f64]) -> Result<(), DynamicsError> {
+        let started = self.evaluations.is_multiple_of(TIMED_EVERY).then(Instant::now);
         self.evaluations += 1;
         let done = forward_dynamics(self.system, state, &mut self.workspace);
+        if let Some(started) = started {
+            self.timed.0 += started.elapsed();
+            self.timed.1 += 1;
+        }
         let [all, cut] = self.nearest_rank_loss;
         self.nearest_rank_loss = [all.min(self.workspace.distance_to_rank_loss()), cut.min(self.workspace.cut_distance_to_rank_loss())];
         done?;

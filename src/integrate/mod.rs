@@ -19,7 +19,7 @@ pub mod tableau;
 pub mod w_tableau;
 
 pub use failure::RunFailure;
-pub use observer::{Flow, Observer, Sample};
+pub use observer::{Flow, LocalError, Observer, Sample};
 pub use rosenbrock_w::RosenbrockW;
 pub use runge_kutta::RungeKutta;
 pub use simulate::{Outcome, Settings, Summary, simulate};
@@ -50,6 +50,9 @@ pub trait Stepper {
 
     /// Work (J) at the fraction `theta` of the attempted step.
     fn interpolate_work(&self, theta: f64) -> f64;
+
+    /// State at the end of the attempted step by the method's other solution, of lower order; false for fixed steps, which have none.
+    fn embedded(&mut self, chart: &Chart<'_>, out: &mut State) -> bool;
 
     /// Makes the end of the attempted step the chart's base.
     fn accept(&mut self, chart: &mut Chart<'_>);

@@ -18,6 +18,17 @@ pub struct Sample<'a> {
     pub steps: u64,
 }
 
+/// The end of a step by the method's two solutions, whose difference is the local error.
+#[derive(Debug)]
+pub struct LocalError<'a> {
+    /// The system.
+    pub system: &'a System,
+    /// Evaluation at the step's end.
+    pub workspace: &'a Workspace,
+    /// Evaluation at the end of the solution of lower order.
+    pub other: &'a Workspace,
+}
+
 /// What an observer asks of the loop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Flow {
@@ -31,6 +42,14 @@ pub enum Flow {
 pub trait Observer {
     /// Called at every output time, in order.
     fn observe(&mut self, sample: &Sample<'_>) -> Flow;
+
+    /// Whether [`Self::local_error`] is to be called; it costs an evaluation each time.
+    fn wants_local_errors(&self) -> bool {
+        false
+    }
+
+    /// Called at some of the accepted steps, before [`Self::step`].
+    fn local_error(&mut self, _error: &LocalError<'_>) {}
 
     /// Called at the end of every accepted step, after the output times within it; the evaluation there costs nothing extra.
     fn step(&mut self, _step: &Sample<'_>) -> Flow {

@@ -279,6 +279,20 @@ impl Stepper for RosenbrockW {
         self.dense(theta, self.y0.len() - 1)
     }
 
+    fn embedded(&mut self, chart: &Chart<'_>, out: &mut State) -> bool {
+        let (n, nv) = (chart.increments(), chart.system.velocity_count);
+        self.y.iter_mut().zip(self.y1.iter().zip(&self.k[STAGES])).for_each(|(y, (y1, e))| *y = y1 - e);
+        // modes that the step does not resolve are damped in the solution that goes on, and must be in its error (Hairer and Wanner
+        // 1996, IV.8: the estimate is filtered by the matrix of the stages)
+        for (m, lambda) in self.added.modal.iter().enumerate() {
+            for i in [nv + m, n + nv + m] {
+                self.y[i] = self.y1[i] - self.k[STAGES][i] / lambda;
+            }
+        }
+        chart.state_of(chart.base.time + self.h, &self.y, out);
+        true
+    }
+
     fn accept(&mut self, chart: &mut Chart<'_>) {
         // the rate at the end of this step is the first rate of the next
         chart.rebase(self.h, &self.y1, &mut self.f1);

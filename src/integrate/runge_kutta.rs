@@ -109,6 +109,12 @@ impl Stepper for RungeKutta {
         self.dense(theta, self.y0.len() - 1)
     }
 
+    fn embedded(&mut self, chart: &Chart<'_>, out: &mut State) -> bool {
+        self.y.iter_mut().zip(self.y1.iter().zip(&self.error)).for_each(|(y, (y1, e))| *y = y1 - e);
+        chart.state_of(chart.base.time + self.h, &self.y, out);
+        self.tolerance.is_some()
+    }
+
     fn accept(&mut self, chart: &mut Chart<'_>) {
         let last = self.k.len() - 1;
         chart.rebase(self.h, &self.y1, &mut self.k[last]);

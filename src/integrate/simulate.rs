@@ -3,7 +3,7 @@
 use super::change_point::{self, Passage};
 use super::chart::Chart;
 use super::failure::RunFailure;
-use super::observer::{Flow, Observer, Sample};
+use super::observer::{Flow, LocalError, Observer, Sample};
 use super::rosenbrock_w::RosenbrockW;
 use super::runge_kutta::RungeKutta;
 use super::stability::{fastest_mode, stable_step};
@@ -93,6 +93,8 @@ pub struct Summary {
     pub rejected: u64,
     /// Evaluations of the dynamics, output included.
     pub evaluations: u64,
+    /// Wall-clock time (s) of one evaluation, the average of every sixteenth.
+    pub evaluation_s: f64,
     /// Largest accepted local error estimate relative to the motion; none for fixed steps.
     pub local_error: Option<f64>,
     /// Last state.
@@ -133,6 +135,7 @@ pub fn simulate(system: &System, start: &State, settings: &Settings, observers: 
         steps,
         rejected,
         evaluations: evaluations + chart.evaluations,
+        evaluation_s: chart.timed.0.as_secs_f64() / f64::from(chart.timed.1.max(1)),
         local_error: tolerance.map(|_| local_error),
         end: chart.base,
     }
@@ -173,6 +176,9 @@ impl OutputTimes {
     }
 }
 
+/// Accepted steps from one look at the local error to the next: a share of the evaluations that is not felt.
+const LOCAL_ERROR_EVERY: u64 = 8;
+
 struct Run<'r, 's> {
     chart: &'r mut Chart<'s>,
     controller: Option<Controller>,
@@ -211,6 +217,9 @@ impl Run<'_, '_> {
                     self.steps += 1;
                     self.creep(taken, end - start)?;
                     let flow = self.emit(stepper, taken, observers);
+                    if self.steps.is_multiple_of(LOCAL_ERROR_EVERY) {
+                        self.show_local_error(stepper, observers);
+                    }
                     stepper.accept(self.chart);
                     if self.chart.base.time + 4.0 * f64::EPSILON * stop.abs() >= stop {
                         // rounding of t + h must not leave a step of a few ulps
@@ -240,6 +249,20 @@ impl Run<'_, '_> {
             }
         }
         Outcome::Completed
+    }
+
+    /// Carries the local error of the attempted step to what the observers look at. A solution without an evaluation says nothing.
+    fn show_local_error(&mut self, stepper: &mut dyn Stepper, observers: &mut [&mut dyn Observer]) {
+        let system = self.chart.system;
+        if !observers.iter().any(|o| o.wants_local_errors()) || !stepper.embedded(self.chart, &mut self.sampled) {
+            return;
+        }
+        self.evaluations += 1;
+        let closed = system.closures.is_empty() || drift::project(system, &mut self.sampled, &mut self.output).is_ok();
+        if closed && forward_dynamics(system, &self.sampled, &mut self.output).is_ok() {
+            let error = LocalError { system, workspace: &self.chart.workspace, other: &self.output };
+            observers.iter_mut().filter(|o| o.wants_local_errors()).for_each(|o| o.local_error(&error));
+        }
     }
 
     /// True if some closure is cut.

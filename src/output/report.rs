@@ -1,8 +1,10 @@
 //! The closing report of a run as a record: what `pliant run --json` prints.
 
 use super::evaluation::{Evaluation, Named};
+use crate::dynamics::profile::EvaluationTime;
 use crate::integrate::Outcome;
 use serde::Serialize;
+use std::time::Duration;
 
 /// Error figures; none where a figure does not apply.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
@@ -17,6 +19,60 @@ pub struct ErrorFigures {
     pub closure: Option<f64>,
     /// Largest accepted local error estimate of the step control.
     pub local: Option<f64>,
+    /// Largest change of a load by the local error of one step (of every eighth), relative to the peak of that load.
+    pub local_load: Option<f64>,
+}
+
+/// Where the wall-clock time of a run went.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct TimeRecord {
+    /// One evaluation of the dynamics (s), the average of every sixteenth.
+    pub per_evaluation_s: f64,
+    /// All evaluations at that price (s).
+    pub evaluations_s: f64,
+    /// Outputs: loads, stress, audit, estimates, files, viewer (s).
+    pub outputs_s: f64,
+    /// What is left: the integrator's own work (s).
+    pub integrator_s: f64,
+    /// Shares of an evaluation, measured at the end of the run.
+    pub sweeps: SweepShares,
+}
+
+/// Shares of one evaluation.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct SweepShares {
+    /// Poses, and inertias of the deformed bodies.
+    pub poses: f64,
+    /// Velocities.
+    pub velocities: f64,
+    /// Articulated inertias.
+    pub inertias: f64,
+    /// Forces.
+    pub forces: f64,
+    /// Accelerations.
+    pub accelerations: f64,
+    /// Closures.
+    pub closures: f64,
+}
+
+impl TimeRecord {
+    /// How `wall` divides, with `evaluations` at their price and `outputs` measured; `one` is an evaluation taken apart.
+    #[must_use]
+    pub fn new(wall: Duration, outputs: Duration, (evaluations, per_evaluation_s): (u64, f64), one: &EvaluationTime) -> Self {
+        let outputs_s = outputs.as_secs_f64();
+        let left = (wall.as_secs_f64() - outputs_s).max(0.0);
+        let evaluations_s = (per_evaluation_s * evaluations as f64).min(left);
+        let share = |x: f64| if one.total() > 0.0 { x / one.total() } else { 0.0 };
+        let sweeps = SweepShares {
+            poses: share(one.poses),
+            velocities: share(one.velocities),
+            inertias: share(one.inertias),
+            forces: share(one.forces),
+            accelerations: share(one.accelerations),
+            closures: share(one.closures),
+        };
+        Self { per_evaluation_s, evaluations_s, outputs_s, integrator_s: left - evaluations_s, sweeps }
+    }
 }
 
 /// Largest load magnitudes at one hinge or closure over all steps and output times. What a gear exerts on an angle counts as a moment.
@@ -180,6 +236,8 @@ pub struct RunReport {
     pub rejected_steps: u64,
     /// Evaluations of the dynamics, output included.
     pub evaluations: u64,
+    /// Where the time went; none if the end state has no evaluation.
+    pub time: Option<TimeRecord>,
     /// Error figures.
     pub errors: ErrorFigures,
     /// Peaks.

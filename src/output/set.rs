@@ -6,18 +6,19 @@ use super::evaluation::Evaluation;
 use super::frame::FrameEvaluator;
 use super::picture::Snapshot;
 use super::plan::{OutputPlan, PlanError};
-use super::report::{OutcomeRecord, Peaks, RunReport, Truncation, Written};
+use super::report::{OutcomeRecord, Peaks, RunReport, TimeRecord, Truncation, Written};
 #[cfg(feature = "hdf5")]
 use super::results::ResultsWriter;
 use super::scales::plain;
 use super::tracker::Tracker;
 use super::truncation::TruncationGauge;
 use super::viewer::ViewerStream;
-use crate::integrate::{Flow, Observer, Outcome, Sample, Summary};
+use crate::dynamics::profile::profile;
+use crate::integrate::{Flow, LocalError, Observer, Outcome, Sample, Summary};
 #[cfg(feature = "hdf5")]
 use crate::io::ResultsError;
 use crate::model::System;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// The outputs of one run.
 #[derive(Debug)]
@@ -31,6 +32,8 @@ pub struct OutputSet<'s> {
     results: Option<ResultsWriter>,
     viewer: Option<ViewerStream>,
     written: Vec<Written>,
+    /// Time that the outputs took.
+    spent: Duration,
 }
 
 impl<'s> OutputSet<'s> {
@@ -50,6 +53,7 @@ impl<'s> OutputSet<'s> {
             results: None,
             viewer: None,
             written: Vec::new(),
+            spent: Duration::ZERO,
         })
     }
 
@@ -107,6 +111,7 @@ impl<'s> OutputSet<'s> {
         #[cfg(feature = "hdf5")]
         self.finish_results(summary);
         self.finish_viewer(summary);
+        let one = summary.end.is_finite().then(|| profile(self.system, &summary.end, PROFILE).ok()).flatten();
         let end = summary.end.is_finite().then(|| Evaluation::of(self.system, &summary.end).ok()).flatten();
         let truncation = self.truncation.as_ref().map(|gauge| gauge.report(self.system));
         let peaks = self.tracker.peaks(self.system);
@@ -119,6 +124,7 @@ impl<'s> OutputSet<'s> {
             steps: summary.steps,
             rejected_steps: summary.rejected,
             evaluations: summary.evaluations,
+            time: one.map(|one| TimeRecord::new(wall, self.spent, (summary.evaluations, summary.evaluation_s), &one)),
             errors: self.tracker.errors(summary.local_error),
             truncation,
             peaks,
@@ -155,6 +161,9 @@ impl<'s> OutputSet<'s> {
     }
 }
 
+/// Time spent at the end of a run on measuring an evaluation.
+const PROFILE: Duration = Duration::from_millis(3);
+
 /// Share of a peak from which what left-out modes change is worth a warning.
 const NOTABLE_TRUNCATION: f64 = 0.01;
 
@@ -168,14 +177,25 @@ fn truncation_warning(truncation: &Truncation, peaks: &Peaks) -> Option<String> 
 
 impl Observer for OutputSet<'_> {
     fn step(&mut self, step: &Sample<'_>) -> Flow {
+        let started = Instant::now();
         self.tracker.follow_step(step);
         if let Some(gauge) = &mut self.truncation {
             gauge.follow(step);
         }
+        self.spent += started.elapsed();
         Flow::Continue
     }
 
+    fn wants_local_errors(&self) -> bool {
+        true
+    }
+
+    fn local_error(&mut self, error: &LocalError<'_>) {
+        self.tracker.follow_local_error(error);
+    }
+
     fn observe(&mut self, sample: &Sample<'_>) -> Flow {
+        let started = Instant::now();
         self.evaluator.evaluate(&self.plan, sample);
         let frame = &self.evaluator.frame;
         self.tracker.follow(&self.plan, sample, frame);
@@ -194,6 +214,7 @@ impl Observer for OutputSet<'_> {
             let snapshot = Snapshot::of(viewer.hinges(), viewer.closures(), sample, frame, &self.tracker.events);
             viewer.send(snapshot);
         }
+        self.spent += started.elapsed();
         Flow::Continue
     }
 }

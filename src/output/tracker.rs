@@ -9,7 +9,7 @@ use super::scales::plain;
 use super::stiffening::StiffeningGauge;
 use crate::dynamics::energy::Momentum;
 use crate::dynamics::hinge_load::hinge_load;
-use crate::integrate::Sample;
+use crate::integrate::{LocalError, Sample};
 use crate::model::{ClosureJoint, HingeKind, System};
 use crate::spatial::shift::{angular, linear};
 use nalgebra::Vector6;
@@ -109,6 +109,8 @@ pub struct Tracker {
     loaded: Vec<usize>,
     loads: Vec<Vector6<f64>>,
     closures: Vec<(String, LoadPeak)>,
+    /// Largest moment and force that the local error of one step stands for, hinges first, then closures; empty before the first.
+    local: Vec<[f64; 2]>,
     /// The closures, in the same order, and what they carried at the last step.
     gauges: Vec<ClosureGauge>,
     records: Vec<ClosureRecord>,
@@ -173,6 +175,7 @@ impl Tracker {
             loads: vec![Vector6::zeros(); loaded.len()],
             loaded,
             closures,
+            local: Vec::new(),
             records: gauges.iter().map(ClosureGauge::nothing).collect(),
             gauges,
             bodies,
@@ -235,6 +238,31 @@ impl Tracker {
         let (loads, records) = (std::mem::take(&mut self.loads), std::mem::take(&mut self.records));
         self.watch_limits(time, |source| source.of_load(&loads, &records));
         (self.loads, self.records) = (loads, records);
+    }
+
+    /// Takes in the local error of a step.
+    pub fn follow_local_error(&mut self, error: &LocalError<'_>) {
+        let Self { loaded, gauges, local, .. } = self;
+        local.resize(loaded.len() + gauges.len(), [0.0; 2]);
+        let hinges = loaded.iter().map(|&k| magnitudes(&(hinge_load(error.other, k) - hinge_load(error.workspace, k))));
+        let load = |g: &ClosureGauge, w| g.load(error.system, w);
+        let closures = gauges.iter().map(|g| load(g, error.other).difference(&load(g, error.workspace)));
+        for (largest, change) in local.iter_mut().zip(hinges.chain(closures)) {
+            (0..2).for_each(|i| largest[i] = largest[i].max(change[i]));
+        }
+    }
+
+    /// The largest of these relative to the peak of its load; peaks that are rounding beside the largest do not count.
+    fn local_load(&self) -> Option<f64> {
+        let peaks: Vec<_> = self.hinges.iter().chain(&self.closures).map(|(_, p)| [p.moment, p.force]).collect();
+        let largest = [0, 1].map(|i| peaks.iter().map(|p| p[i]).fold(0.0, f64::max));
+        // a moment is rounding beside forces on arms of 1 m too
+        let largest = [largest[0].max(largest[1]), largest[1]];
+        let counts = |peak: f64, i: usize| peak > 1e-9 * largest[i];
+        let share = |(change, peak): (&[f64; 2], &[f64; 2])| {
+            (0..2).filter(|&i| counts(peak[i], i)).map(|i| change[i] / peak[i]).fold(0.0, f64::max)
+        };
+        self.local.iter().zip(&peaks).map(share).reduce(f64::max)
     }
 
     /// Holds the quantities that `value` knows against their limits.
@@ -308,6 +336,7 @@ impl Tracker {
             audit: self.audit,
             closure: self.closure,
             local,
+            local_load: self.local_load(),
         }
     }
 
