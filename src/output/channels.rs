@@ -113,6 +113,13 @@ pub fn residual_unit(system: &System, closure: &Closure) -> &'static str {
     }
 }
 
+/// Where the load acts and how the axes of its components stand, both in the world.
+fn pose_channels(group: &'static str, owner: &str, point: &str, axes: &str, out: &mut Vec<Channel>) {
+    let new = |quantity, width, unit| Channel { frame: Some("world".into()), ..Channel::new(group, owner, quantity, Some(width), unit) };
+    out.push(Channel { point: Some(point.into()), ..new("load_point", 3, "m").components("x, y, z") });
+    out.push(Channel { point: Some(axes.into()), ..new("load_quaternion", 4, "1").components("w, x, y, z") });
+}
+
 fn closure_channels(system: &System, closure: &Closure, out: &mut Vec<Channel>) {
     let new = |quantity, width, unit: &str| Channel::new("closures", &closure.name, quantity, width, unit);
     let side = Some(closure_side(system, closure));
@@ -123,6 +130,7 @@ fn closure_channels(system: &System, closure: &Closure, out: &mut Vec<Channel>) 
                 let (frame, point, side) = (closure_frame(system, closure), Some(CLOSURE_POINT.into()), side.clone());
                 out.push(Channel { frame, point, side, ..new(quantity, Some(3), unit).components("x, y, z") });
             }
+            pose_channels("closures", &closure.name, CLOSURE_POINT, "axes of frame a", out);
         }
     }
     out.push(new("residual", None, residual_unit(system, closure)));
@@ -142,6 +150,7 @@ fn hinge_channels(system: &System, body: &Body, out: &mut Vec<Channel>) {
             ..new(quantity, 3, unit.into()).components("x, y, z")
         });
     }
+    pose_channels("hinges", name, "O", "axes of O", out);
 }
 
 fn body_channels(body: &Body, stress: bool, out: &mut Vec<Channel>) {

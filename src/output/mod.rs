@@ -7,6 +7,7 @@ pub mod channels;
 pub mod closure_load;
 pub mod evaluation;
 pub mod frame;
+pub mod load_pose;
 pub mod picture;
 pub mod plan;
 pub mod report;

@@ -4,15 +4,15 @@
 use super::channels::{closure_side, load_frame, load_side, residual_unit};
 use super::closure_load::{ClosureLoad, ClosureRecord};
 use super::frame::OutputFrame;
+use super::load_pose::{closure_pose, hinge_pose};
 use super::plan::{BodyBox, OutputPlan};
 use super::tracker::Event;
 use crate::dynamics::Workspace;
-use crate::dynamics::frame_motion::FramePose;
 use crate::dynamics::sweep::pose_outward::pose_outward;
-use crate::dynamics::world::{WorldFrame, hinge_frame, world_frames};
+use crate::dynamics::world::{WorldFrame, world_frames};
 use crate::integrate::Sample;
 use crate::model::Surface;
-use crate::model::{Body, BodyKind, ClosureJoint, ClosureSide, HingeKind, State, System};
+use crate::model::{Body, BodyKind, HingeKind, State, System};
 use crate::scene::closures::gear_unit;
 use crate::spatial::rotation::quaternion_of_matrix;
 use crate::spatial::shift::{angular, linear};
@@ -288,16 +288,12 @@ impl Snapshot {
     /// The snapshot of `sample` for hinges, by the bodies that they carry, and closures.
     #[must_use]
     pub fn of(hinges: &[usize], closures: &[usize], sample: &Sample<'_>, frame: &OutputFrame, events: &[Event]) -> Self {
-        let Sample { system, state, workspace, .. } = *sample;
+        let Sample { system, state, .. } = *sample;
         let pose = |(body, frame): (&Body, &WorldFrame)| {
             let frame = frame.body_frame(body);
             (frame.position.into(), quaternion_of_matrix(&frame.rotation))
         };
-        let load = |(&k, load): (&usize, &Vector6<f64>)| {
-            let at = hinge_frame(&system.bodies[k], &workspace.pose, k, &frame.frames);
-            let turned = |x: Vector3<f64>| (at.rotation * x).into();
-            LoadSnapshot { point: at.position.into(), moment_world: turned(angular(load)), force_world: turned(linear(load)), load: *load }
-        };
+        let load = |(&k, load): (&usize, &Vector6<f64>)| load_snapshot(&hinge_pose(sample, k, &frame.frames), load);
         Self {
             time: state.time,
             poses: system.bodies.iter().zip(&frame.frames).map(pose).collect(),
@@ -309,24 +305,14 @@ impl Snapshot {
     }
 }
 
-/// Pose of one frame of a closure in inertial axes.
-fn side_frame(system: &System, state: &State, side: &ClosureSide, frames: &[WorldFrame]) -> WorldFrame {
-    let (body, eta) = match side.body {
-        None => (WorldFrame::default(), &[][..]),
-        Some(k) => (frames[k], &state.modal_position[system.bodies[k].modal_range()]),
-    };
-    let own = FramePose::of(&side.attachment, eta);
-    WorldFrame { rotation: body.rotation * own.rotation, position: body.position + body.rotation * own.position }
+fn load_snapshot(at: &WorldFrame, load: &Vector6<f64>) -> LoadSnapshot {
+    let turned = |x: Vector3<f64>| (at.rotation * x).into();
+    LoadSnapshot { point: at.position.into(), moment_world: turned(angular(load)), force_world: turned(linear(load)), load: *load }
 }
 
 fn closure_snapshot(index: usize, record: &ClosureRecord, sample: &Sample<'_>, frames: &[WorldFrame]) -> ClosureSnapshot {
-    let joint = match (&record.load, &sample.system.closures[index].joint) {
-        (ClosureLoad::Joint(load), ClosureJoint::Frames { a, b, .. }) => {
-            let [a, b] = [a, b].map(|side| side_frame(sample.system, sample.state, side, frames));
-            let turned = |x: Vector3<f64>| (a.rotation * x).into();
-            let (moment_world, force_world) = (turned(angular(load)), turned(linear(load)));
-            Some(LoadSnapshot { point: b.position.into(), moment_world, force_world, load: *load })
-        }
+    let joint = match (&record.load, closure_pose(sample, index, frames)) {
+        (ClosureLoad::Joint(load), Some(at)) => Some(load_snapshot(&at, load)),
         _ => None,
     };
     ClosureSnapshot { joint, gear: record.load.coordinate_force(), residual: record.residual }

@@ -4,7 +4,9 @@
 
 use super::channels::{Channel, result_channels};
 use super::frame::OutputFrame;
+use super::load_pose::{closure_pose, hinge_pose};
 use super::plan::OutputPlan;
+use crate::dynamics::world::WorldFrame;
 use crate::integrate::Sample;
 use crate::io::results_file::{Preface, ResultsError, ResultsFile, SeriesSpec, escape};
 use crate::model::System;
@@ -22,7 +24,7 @@ pub const VERSION: &str = "1.0";
 pub struct ResultsWriter {
     file: ResultsFile,
     row: Vec<f64>,
-    /// Last quaternion per body: of the two that mean the same, the one nearer to the last is written.
+    /// Last quaternion of every pose in the order of the row: of the two that mean the same, the one nearer to the last is written.
     quaternions: Vec<[f64; 4]>,
 }
 
@@ -34,7 +36,7 @@ impl ResultsWriter {
     pub fn create(path: &Path, system: &System, plan: &OutputPlan) -> Result<Self, ResultsError> {
         let series: Vec<_> = result_channels(system, plan).iter().map(series_of).collect();
         let file = ResultsFile::create(path, &preface(plan), &series)?;
-        Ok(Self { file, row: Vec::new(), quaternions: vec![[1.0, 0.0, 0.0, 0.0]; system.bodies.len()] })
+        Ok(Self { file, row: Vec::new(), quaternions: Vec::new() })
     }
 
     /// The path as given.
@@ -57,6 +59,21 @@ impl ResultsWriter {
         let Sample { system, state, workspace, work, .. } = *sample;
         let row = &mut self.row;
         row.clear();
+        let mut poses = 0;
+        let mut pose = |row: &mut Vec<f64>, frame: &WorldFrame| {
+            if poses == self.quaternions.len() {
+                self.quaternions.push([1.0, 0.0, 0.0, 0.0]);
+            }
+            row.extend(frame.position.iter());
+            let last = &mut self.quaternions[poses];
+            let mut quaternion = quaternion_of_matrix(&frame.rotation);
+            if quaternion.iter().zip(last.iter()).map(|(a, b)| a * b).sum::<f64>() < 0.0 {
+                quaternion = quaternion.map(|x| -x);
+            }
+            *last = quaternion;
+            row.extend(quaternion);
+            poses += 1;
+        };
         row.push(state.time);
         // the loads of a frame start with those of the plan's hinges
         for (&k, load) in plan.hinges.iter().zip(&frame.loads) {
@@ -65,26 +82,22 @@ impl ResultsWriter {
             row.extend_from_slice(&state.velocity[body.velocity_range()]);
             row.extend_from_slice(&workspace.acceleration.hinge[body.velocity_range()]);
             row.extend(load.iter());
+            pose(row, &hinge_pose(sample, k, &frame.frames));
         }
         // as those of its closures do
-        for (_, record) in plan.closures.iter().zip(&frame.closures) {
+        for (&i, record) in plan.closures.iter().zip(&frame.closures) {
             match record.load.coordinate_force() {
                 Some(force) => row.push(force),
                 None => row.extend(record.load.spatial().iter()),
+            }
+            if let Some(at) = closure_pose(sample, i, &frame.frames) {
+                pose(row, &at);
             }
             row.push(record.residual);
         }
         for &k in &system.definition_order {
             let body = &system.bodies[k];
-            let pose = frame.frames[k].body_frame(body);
-            row.extend(pose.position.iter());
-            let last = &mut self.quaternions[k];
-            let mut quaternion = quaternion_of_matrix(&pose.rotation);
-            if quaternion.iter().zip(last.iter()).map(|(a, b)| a * b).sum::<f64>() < 0.0 {
-                quaternion = quaternion.map(|x| -x);
-            }
-            *last = quaternion;
-            row.extend(quaternion);
+            pose(row, &frame.frames[k].body_frame(body));
             row.extend_from_slice(&state.modal_position[body.modal_range()]);
             row.extend_from_slice(&state.modal_velocity[body.modal_range()]);
             row.extend_from_slice(&workspace.acceleration.modal[body.modal_range()]);
