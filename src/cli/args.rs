@@ -26,6 +26,8 @@ pub enum Command {
     Check(CheckArguments),
     /// Show the modes of a modal file: frequencies, effective masses, participation, interfaces, rules
     Modes(ModesArguments),
+    /// Export a results file: motion, stress and loads for ParaView (XDMF), or histories as a table (CSV, Parquet)
+    Export(ExportArguments),
 }
 
 /// Arguments of `pliant check`.
@@ -47,7 +49,55 @@ pub struct ModesArguments {
     /// The modal file (.h5)
     #[arg(value_name = "FILE")]
     pub file: PathBuf,
+    /// Also write files for ParaView beside it: NAME.xdmf with all modes, NAME.modes.xdmf with one step per mode
+    #[arg(long, value_name = "FORMAT", value_enum)]
+    pub export: Option<ModesFormat>,
     /// Print one JSON object instead of tables
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Formats of `pliant modes --export`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum ModesFormat {
+    /// XDMF that points into the modal file
+    Xdmf,
+}
+
+/// Formats of `pliant export`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum ExportFormat {
+    /// A folder of XDMF files over one HDF5 file, for ParaView, VTK and meshio
+    Xdmf,
+    /// All histories as comma-separated text
+    Csv,
+    /// All histories as an Apache Parquet table
+    Parquet,
+}
+
+/// Arguments of `pliant export`.
+#[derive(Debug, Args)]
+#[command(help_expected = true)]
+pub struct ExportArguments {
+    /// The results file (.h5) of pliant run --out
+    #[arg(value_name = "RUN.h5")]
+    pub results: PathBuf,
+    /// What to write
+    #[arg(long, value_name = "FORMAT", value_enum)]
+    pub format: ExportFormat,
+    /// Where to write: a folder for xdmf, a file for csv and parquet [default: RUN_xdmf, RUN.csv or RUN.parquet beside RUN.h5]
+    #[arg(long, value_name = "PATH")]
+    pub out: Option<PathBuf>,
+    /// Take every N-th output time
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub every: usize,
+    /// Flexible body to export with --format xdmf (may be given several times) [default: all]
+    #[arg(long, value_name = "NAME")]
+    pub body: Vec<String>,
+    /// Modal file that is not where the run read it (may be given several times); bodies find theirs by content
+    #[arg(long, value_name = "FILE.h5")]
+    pub modal_file: Vec<PathBuf>,
+    /// Print one JSON object
     #[arg(long)]
     pub json: bool,
 }

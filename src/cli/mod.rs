@@ -5,8 +5,11 @@
 //! A new subcommand is one variant of [`args::Command`], one file here and one arm of `run`.
 
 pub mod args;
+mod built_in;
 mod check;
 mod eval;
+#[cfg(feature = "hdf5")]
+mod export;
 mod failure;
 #[cfg(feature = "hdf5")]
 mod modes;
@@ -51,6 +54,10 @@ fn run(arguments: Arguments, output: &mut dyn Write) -> Result<(), Failure> {
         Some(Command::Eval(arguments)) => eval::run(&arguments, output),
         Some(Command::Study(arguments)) => study::run(&arguments, output),
         Some(Command::Check(arguments)) => check::run(&arguments, output),
+        #[cfg(feature = "hdf5")]
+        Some(Command::Export(arguments)) => export::run(&arguments, output),
+        #[cfg(not(feature = "hdf5"))]
+        Some(Command::Export(_)) => Err(Failure::input("this build cannot read results files; build with the feature \"hdf5\"")),
         #[cfg(feature = "hdf5")]
         Some(Command::Modes(arguments)) => modes::run(&arguments, output),
         #[cfg(not(feature = "hdf5"))]

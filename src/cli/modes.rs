@@ -38,7 +38,10 @@ pub fn run(arguments: &ModesArguments, output: &mut dyn Write) -> Result<(), Fai
     } else {
         write_text(&summary, &examination, output)?;
     }
-    if messages.is_empty() { Ok(()) } else { Err(Failure::Input(messages)) }
+    if !messages.is_empty() {
+        return Err(Failure::Input(messages));
+    }
+    if arguments.export.is_some() { super::export::modes(arguments) } else { Ok(()) }
 }
 
 fn summarise(file: ModalFile, body: ModalBody) -> Result<Summary, Failure> {

@@ -1,6 +1,7 @@
 //! `pliant run`: simulate a scene and report.
 
 use super::args::{RunArguments, Viewer};
+use super::built_in;
 use super::failure::{Failure, with_causes};
 use super::report::number;
 use super::run_report;
@@ -11,7 +12,7 @@ use crate::integrate::{Flow, Observer, Outcome, Sample, Settings, simulate};
 use crate::model::aggregate::{LARGE_LOOP, MANY_LOOPS};
 use crate::model::{ClosureMethod, System};
 use crate::output::{OutputPlan, OutputSet, RunReport};
-use crate::scene::{Overrides, Scene, SceneError, assemble};
+use crate::scene::{Overrides, Scene, assemble};
 use crate::study::verify::{Verification, VerifiedReport, tighter};
 use crate::study::{History, Recorder};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -23,12 +24,6 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-/// The built-in example, laid out as in the repository.
-const EXAMPLE: [(&str, &[u8]); 2] = [
-    ("examples/02_hub_two_panels/scene.toml", include_bytes!("../../examples/02_hub_two_panels/scene.toml")),
-    ("modes/panel_cantilever.h5", include_bytes!("../../modes/panel_cantilever.h5")),
-];
-
 /// Simulates the scene and prints the closing report.
 pub fn run(arguments: &RunArguments, output: &mut dyn Write) -> Result<(), Failure> {
     let mut overrides = Overrides::from(&arguments.overrides);
@@ -37,9 +32,12 @@ pub fn run(arguments: &RunArguments, output: &mut dyn Write) -> Result<(), Failu
     }
     overrides.duration = arguments.duration;
     // the folder must live as long as the modal files in it are read
-    let (scene, _folder) = match &arguments.scene {
+    let (scene, _example) = match &arguments.scene {
         Some(path) => (assemble::load(path, &overrides)?, None),
-        None => built_in(&overrides).map(|(scene, folder)| (scene, Some(folder)))?,
+        None => {
+            let example = built_in::Unpacked::new()?;
+            (assemble::load(&example.scene(), &overrides)?, Some(example))
+        }
     };
     let Some(duration) = scene.duration else {
         let message = "the scene has no [simulation] duration; add one (s) or give --duration".to_owned();
@@ -180,20 +178,6 @@ fn not_unique(scene: &Scene) -> Result<Option<String>, Failure> {
     forward_dynamics(&scene.system, &scene.state, &mut workspace)
         .map_err(|e| Failure::input(format!("{}: at the start: {}", scene.source.path.display(), with_causes(&e))))?;
     Ok(workspace.redundancy_warning(&scene.system))
-}
-
-/// Unpacks the example into a folder of its own.
-fn built_in(overrides: &Overrides) -> Result<(Scene, tempfile::TempDir), Failure> {
-    let wrap = |path: &Path, source: std::io::Error| SceneError::Read { path: path.to_owned(), source };
-    let folder = tempfile::tempdir().map_err(|e| wrap(&std::env::temp_dir(), e))?;
-    for (name, bytes) in EXAMPLE {
-        let path = folder.path().join(name);
-        if let Some(parent) = path.parent() {
-            std::fs::create_dir_all(parent).map_err(|e| wrap(parent, e))?;
-        }
-        std::fs::write(&path, bytes).map_err(|e| wrap(&path, e))?;
-    }
-    Ok((assemble::load(&folder.path().join(EXAMPLE[0].0), overrides)?, folder))
 }
 
 #[cfg(feature = "hdf5")]

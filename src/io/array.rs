@@ -117,7 +117,7 @@ impl GuardedDataset<'_> {
         Ok(values)
     }
 
-    /// Rows `rows` of a dataset of rank 2, in C order, exactly as stored; the caller keeps the range inside the shape.
+    /// Rows `rows` of a dataset of rank 1 or 2, in C order, exactly as stored; the caller keeps the range inside the shape.
     pub fn read_rows<T: Element>(&self, rows: Range<usize>) -> Result<Vec<T>, ModalFileError> {
         if self.element != T::TYPE {
             return Err(self.file.wrong_type(&self.path, self.element.name(), T::TYPE.name()));
@@ -125,8 +125,12 @@ impl GuardedDataset<'_> {
         if rows.is_empty() {
             return Ok(Vec::new());
         }
-        let read = self.dataset.as_reader().no_convert().read_slice_2d::<T, _>((rows, ..));
-        Ok(read.map_err(|e| self.file.unreadable(&self.path, &e))?.into_raw_vec_and_offset().0)
+        let reader = self.dataset.as_reader().no_convert();
+        let read = match self.shape.len() {
+            1 => reader.read_slice_1d::<T, _>(rows).map(|values| values.into_raw_vec_and_offset().0),
+            _ => reader.read_slice_2d::<T, _>((rows, ..)).map(|values| values.into_raw_vec_and_offset().0),
+        };
+        read.map_err(|e| self.file.unreadable(&self.path, &e))
     }
 
     /// All elements of an f8 dataset, finite.
@@ -143,7 +147,7 @@ impl GuardedDataset<'_> {
         Ok(values)
     }
 
-    /// Some rows of an f8 or f4 dataset of rank 2, finite.
+    /// Some rows of an f8 or f4 dataset of rank 1 or 2, finite.
     pub fn read_real_rows(&self, rows: Range<usize>) -> Result<Vec<f64>, ModalFileError> {
         let values = if self.element == ElementType::F4 { widen(&self.read_rows::<f32>(rows)?) } else { self.read_rows::<f64>(rows)? };
         self.finite(&values)?;

@@ -1,5 +1,6 @@
 //! Files to model types and back: the only layer that opens HDF5 files. It holds no physics and uses `model` alone.
-//! [`results_file`] writes time histories; what they mean is the business of the layer above.
+//! [`results_file`] writes time histories and [`results_reader`] reads them back; what they mean is the business of the layer above.
+//! [`field_file`] writes the arrays that exported pictures point into.
 //!
 //! A modal file (schema `flexible-body-modes` 1.0) comes from elsewhere and is never trusted: `guard` decides what may be read
 //! at all, [`modal_file`] turns datasets into a [`crate::model::modal_body::ModalBody`], [`modal_mesh`] reads the per-node data that
@@ -17,14 +18,17 @@ mod array;
 mod chunks;
 mod digest;
 pub mod error;
+pub mod field_file;
 mod guard;
 pub mod header;
 pub mod health;
 mod lumped;
 pub mod modal_check;
 pub mod modal_file;
+pub mod modal_layout;
 pub mod modal_mesh;
 pub mod results_file;
+pub mod results_reader;
 
 pub use error::ModalFileError;
 pub use header::{Header, NodeMassKind};
@@ -32,3 +36,4 @@ pub use health::{Bound, HealthReport, Rule, RuleResult, Verdict};
 pub use modal_check::{Examination, examine};
 pub use modal_file::{Coupling, InterfaceSupport, ModalFile, ModeKind};
 pub use results_file::{ResultsError, ResultsFile};
+pub use results_reader::ResultsReader;

@@ -6,6 +6,8 @@
 pub mod channels;
 pub mod closure_load;
 pub mod evaluation;
+#[cfg(feature = "hdf5")]
+pub mod export;
 pub mod frame;
 pub mod load_pose;
 pub mod picture;

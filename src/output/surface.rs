@@ -38,17 +38,34 @@ impl Surface {
 
     /// Deformed positions (m, body axes) at the modal coordinates `eta`, the deformation times `scale`; `out` has one entry per point.
     pub fn deform(&self, eta: &[f64], scale: f64, out: &mut [[f32; 3]]) {
-        for (block, (points, out)) in self.points.chunks(BLOCK).zip(out.chunks_mut(BLOCK)).enumerate() {
+        let points = &self.points;
+        self.displacements(eta, |i, u| {
+            if let (Some(out), Some(x)) = (out.get_mut(i), points.get(i)) {
+                *out = std::array::from_fn(|a| (x[a] + scale * u[a]) as f32);
+            }
+        });
+    }
+
+    /// Displacements (m, body axes) by the modal coordinates `eta`; `out` has one entry per point.
+    pub fn displace(&self, eta: &[f64], out: &mut [[f64; 3]]) {
+        self.displacements(eta, |i, u| {
+            if let Some(out) = out.get_mut(i) {
+                *out = *u;
+            }
+        });
+    }
+
+    /// Displacement of every point, handed to `each` by index.
+    fn displacements(&self, eta: &[f64], mut each: impl FnMut(usize, &[f64; 3])) {
+        for start in (0..self.points.len()).step_by(BLOCK) {
             let mut sum = [[0.0_f64; 3]; BLOCK];
             for (shape, eta) in self.displacement.iter().zip(eta) {
-                let shape = shape.get(block * BLOCK..).unwrap_or_default();
-                for (sum, u) in sum.iter_mut().zip(shape) {
+                for (sum, u) in sum.iter_mut().zip(shape.get(start..).unwrap_or_default()) {
                     (0..3).for_each(|i| sum[i] += eta * f64::from(u[i]));
                 }
             }
-            for ((out, x), u) in out.iter_mut().zip(points).zip(&sum) {
-                *out = std::array::from_fn(|i| (x[i] + scale * u[i]) as f32);
-            }
+            let count = BLOCK.min(self.points.len() - start);
+            sum[..count].iter().enumerate().for_each(|(i, u)| each(start + i, u));
         }
     }
 
