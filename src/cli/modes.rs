@@ -80,6 +80,10 @@ fn write_text(summary: &Summary, examination: &Examination, output: &mut dyn Wri
     let stiffness = if body.stiffness.is_some() { "full modal stiffness" } else { "diagonal modal stiffness" };
     writeln!(output, "  holds           {stiffness}, {geometric}, {stress}")?;
 
+    if let Ok(Some(source)) = summary.file.inertia_source() {
+        writeln!(output, "  integrals       {source}")?;
+    }
+
     let right = |name: &'static str| (name, Align::Right);
     writeln!(output, "\nEffective mass and inertia about the root (percent of mass, of inertia; cumulative below)")?;
     let axes = ["x", "y", "z", "rx", "ry", "rz", "cum x", "cum y", "cum z", "cum rx", "cum ry", "cum rz"].map(right);
@@ -163,6 +167,7 @@ fn object(summary: &Summary, examination: &Examination, accepted: bool) -> Value
         "inertia": (0..3).map(|a| [body.inertia[(a, 0)], body.inertia[(a, 1)], body.inertia[(a, 2)]]).collect::<Vec<_>>(),
         "full_stiffness": body.stiffness.is_some(),
         "geometric_stiffness": body.geometric_stiffness.is_some(),
+        "inertia_source": summary.file.inertia_source().ok().flatten(),
         "stress": summary.file.stress_location().ok().flatten().is_some(),
         "modes": (0..body.mode_count()).map(mode).collect::<Vec<_>>(),
         "interfaces": interfaces.collect::<Vec<_>>(),

@@ -120,6 +120,13 @@ impl Rows {
         self.push(rule, object, Some(figure), Some(bound), verdict, note);
     }
 
+    /// Adds what the figure of a rule cannot say.
+    fn remark(&mut self, rule: Rule, remark: String) {
+        for row in self.0.iter_mut().filter(|row| row.rule == rule) {
+            row.note = Some(row.note.take().map_or(remark.clone(), |note| format!("{note}; {remark}")));
+        }
+    }
+
     /// A rule that holds by the reading itself.
     fn held(&mut self, rule: Rule, note: String) {
         self.push(rule, "", None, None, Verdict::Ok, Some(note));
@@ -153,6 +160,9 @@ fn read_and_judge(path: &Path, rows: &mut Rows) -> Result<(ModalFile, ModalBody)
     judge_rigid(rows, &body, &sums);
     judge_integrals(rows, &body, file.read_modal_mass_departure()?);
     judge_lumped(rows, &file, &body, &sums);
+    if let Some(source) = file.inertia_source()? {
+        rows.remark(Rule::Orthonormality, source);
+    }
     judge_boundary(rows, &body, &sums);
     judge_interfaces(rows, &body, &supports, &sums);
     judge_geometric(rows, &file, &body)?;

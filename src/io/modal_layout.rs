@@ -1,4 +1,4 @@
-//! How the fields of a modal file are stored: what another program needs to open them where they lie.
+//! How the fields of a modal file are stored and where its integrals come from: what another program, or a reader of the report, asks.
 
 use super::array::ElementType;
 use super::error::ModalFileError;
@@ -37,6 +37,18 @@ impl ModalFile {
             }
         };
         Ok(FieldLayout { cell_type: self.file.text("mesh/cells", "cell_type")?, cells: self.cell_shape()?, displacement, stress })
+    }
+
+    /// Where the inertia integrals come from, if the file says so: converters write lumped sums here, with what these miss.
+    ///
+    /// # Errors
+    /// If the attribute is no text.
+    pub fn inertia_source(&self) -> Result<Option<String>, ModalFileError> {
+        match self.file.text("inertia", "source") {
+            Ok(text) => Ok(Some(text)),
+            Err(ModalFileError::Missing { .. }) => Ok(None),
+            Err(error) => Err(error),
+        }
     }
 
     /// Frequencies (Hz), length n.
