@@ -9,6 +9,7 @@ Layers, each using only those before it:
     modes         static flexibility with the root held, elastic eigenmodes
     reduction     cantilever, Craig-Bampton and free-free mode sets
     inertia       integrals of the body with modes, nodal masses
+    lumped        nodal masses alone: their integrals, orthonormalisation, rigid fits (used by `convert`)
     geometric     stiffness of prestress by unit inertial loads
     stress        modal stress tensors
     theory        Ritz references: Timoshenko beam, Mindlin plate

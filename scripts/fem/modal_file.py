@@ -29,7 +29,10 @@ _VTKHDF_VERSION = (2, 0)
 class ModalData:
     """What a modal file holds, in the node order of the solid.
 
-    interfaces: name -> (Interface, coupling, six-vectors (n,6)); stress (n,N,6) or (n,E,6) by stress_location.
+    solid: points (N,3), cells (E,k), node_count and element (cell_type, vtk_type, node_mass_kind). interfaces: name -> (with nodes,
+    weights and position; coupling; six-vectors (n,6)). stress (n,N,6) or (n,E,6) by stress_location.
+    What other codes bring, or do not: triangles (T,3) instead of the faces of hexahedra; rotation (n,N,3); node_inertia (N,6) with
+    rotary_inertia (3,3), their sum, and angular_momentum (n,3); inertia_source, where integrals come from and what they miss.
     """
     title: str
     generator: str
@@ -42,16 +45,22 @@ class ModalData:
     kind: np.ndarray
     displacement: np.ndarray
     displacement_precision: str
-    stress: np.ndarray
+    stress: np.ndarray | None
     stress_location: str
     interfaces: dict
-    geometric_stiffness: np.ndarray
+    geometric_stiffness: np.ndarray | None
+    triangles: np.ndarray | None = None
+    rotation: np.ndarray | None = None
+    node_inertia: np.ndarray | None = None
+    rotary_inertia: np.ndarray | None = None
+    angular_momentum: np.ndarray | None = None
+    inertia_source: str | None = None
 
 
 def write(path, data):
     """Writes one modal file without sidecars."""
     solid, count = data.solid, len(data.frequency)
-    triangles = surface_triangles(solid.cells)
+    triangles = surface_triangles(solid.cells) if data.triangles is None else data.triangles
     order, number = _surface_first(solid.node_count, [triangles.ravel(), *(item[0].nodes for item in data.interfaces.values())])
     with h5py.File(path, "w", track_order=False) as file:
         _set_text(file, format=FORMAT, version=VERSION, units=UNITS, title=data.title, generator=data.generator,
@@ -66,7 +75,8 @@ def write(path, data):
             put(group, "nodes", number[interface.nodes], "i8")
             put(group, "weights", interface.weights, "f8")
             put(group, "displacement", six_vectors, "f8", components="ux uy uz rx ry rz")
-        put(file, "geometric/stiffness", data.geometric_stiffness, "f8", loads=" ".join(LOADS))
+        if data.geometric_stiffness is not None:
+            put(file, "geometric/stiffness", data.geometric_stiffness, "f8", loads=" ".join(LOADS))
         _write_vtkhdf(file)
         _set_text(file, content_sha256=digest(file))
 
@@ -81,10 +91,17 @@ def _write_mesh(file, data, triangles, order, number):
     put(file, "mesh/node_mass", data.node_mass[order], "f8", kind=element.node_mass_kind)
     put(file, "body/mass", integrals.mass, "f8")
     put(file, "body/center_of_mass", integrals.center_of_mass, "f8")
-    put(file, "body/inertia", integrals.inertia, "f8", about="origin of mesh/points")
+    rotary = 0.0 if data.rotary_inertia is None else data.rotary_inertia
+    put(file, "body/inertia", integrals.inertia + rotary, "f8", about="origin of mesh/points")
     put(file, "inertia/momentum", integrals.momentum, "f8", meaning="p[j,a] = int rho phi_ja dV")
     put(file, "inertia/first_moment", integrals.first_moment, "f8", meaning="Q[j,a,b] = int rho r_a phi_jb dV")
     put(file, "inertia/second_moment", integrals.second_moment, "f8", meaning="P[j,k,a,b] = int rho phi_ja phi_kb dV")
+    if data.node_inertia is not None:
+        put(file, "mesh/node_inertia", data.node_inertia[order], "f8", components="xx yy zz xy yz xz")
+        put(file, "inertia/angular_momentum", data.angular_momentum, "f8", meaning="eps : Q and the nodes' own part")
+        put(file, "inertia/modal_mass", np.eye(len(data.frequency)), "f8", meaning="tr P and the nodes' own part")
+    if data.inertia_source is not None:
+        _set_text(file["inertia"], source=data.inertia_source)
 
 
 def _write_modes(file, data, order):
@@ -92,20 +109,30 @@ def _write_modes(file, data, order):
     put(file, "modes/damping_ratio", data.damping_ratio, "f8")
     put(file, "modes/kind", data.kind, "u1", meaning="0 normal, 1 orthonormalised Craig-Bampton, 2 attachment")
     _set_text(file.create_group("modes/displacement"), unit="m per unit modal coordinate (kg^0.5 m)")
-    _set_text(file.create_group("modes/stress"), location=data.stress_location, components="xx yy zz xy yz xz",
-              unit="Pa per unit modal coordinate (kg^0.5 m)")
+    if data.rotation is not None:
+        _set_text(file.create_group("modes/rotation"), unit="rad per unit modal coordinate (kg^0.5 m)")
+    if data.stress is not None:
+        _set_text(file.create_group("modes/stress"), location=data.stress_location, components="xx yy zz xy yz xz",
+                  unit="Pa per unit modal coordinate (kg^0.5 m)")
     for mode in range(len(data.frequency)):
         shape = data.displacement[mode][order]
         if data.displacement_precision == "f4":
             shape = _rounded(shape, _DISPLACEMENT_RESOLUTION)
         put(file, f"modes/displacement/{mode:04d}", shape, data.displacement_precision)
+        if data.rotation is not None:
+            put(file, f"modes/rotation/{mode:04d}", data.rotation[mode][order], "f8")
+        if data.stress is None:
+            continue
         stress = data.stress[mode][order] if data.stress_location == "node" else data.stress[mode]
         put(file, f"modes/stress/{mode:04d}", _rounded(stress, _STRESS_RESOLUTION), "f4")
 
 
 def _rounded(values, resolution):
     # A step that is a power of two keeps the rounded values exact in binary.
-    step = 2.0 ** np.floor(np.log2(np.abs(values).max() * resolution))
+    largest = np.abs(values).max()
+    if largest == 0:
+        return values
+    step = 2.0 ** np.floor(np.log2(largest * resolution))
     return np.round(values / step) * step + 0.0
 
 
@@ -125,6 +152,8 @@ def _write_vtkhdf(file):
     point_data, cell_data = group.create_group("PointData"), group.create_group("CellData")
     for mode, shape in file["modes/displacement"].items():
         point_data[f"mode_{mode}"] = shape
+    if "modes/stress" not in file:
+        return
     stress_data = point_data if file["modes/stress"].attrs["location"] == b"node" else cell_data
     for mode, stress in file["modes/stress"].items():
         stress_data[f"stress_{mode}"] = stress

@@ -8,7 +8,10 @@ from xml.sax.saxutils import quoteattr
 
 import h5py
 
-_TOPOLOGY = {"hexahedron20": "Hexahedron_20", "hexahedron27": "Hexahedron_27"}
+_TOPOLOGY = {"vertex": "Polyvertex", "line": "Polyline", "triangle": "Triangle", "triangle6": "Triangle_6", "quad": "Quadrilateral",
+             "quad8": "Quadrilateral_8", "quad9": "Quadrilateral_9", "tetra": "Tetrahedron", "tetra10": "Tetrahedron_10",
+             "pyramid": "Pyramid", "pyramid13": "Pyramid_13", "wedge": "Wedge", "wedge15": "Wedge_15", "hexahedron": "Hexahedron",
+             "hexahedron20": "Hexahedron_20", "hexahedron27": "Hexahedron_27"}
 _NUMBER = {"f": "Float", "i": "Int", "u": "UInt"}
 _ATTRIBUTE = {3: "Vector", 6: "Tensor6"}
 _MESH_OF_FIRST_GRID = ('<xi:include xpointer="xpointer(//Grid[@Name=&quot;mesh&quot;]/*[self::Topology or self::Geometry])"/>')
@@ -19,16 +22,19 @@ def write(path):
     path = Path(path)
     with h5py.File(path) as file:
         mesh = _mesh(path.name, file)
-        shapes, stresses = file["modes/displacement"], file["modes/stress"]
-        center = "Node" if stresses.attrs["location"] == b"node" else "Cell"
+        shapes, stresses = file["modes/displacement"], file.get("modes/stress")
+        center = "Node" if stresses is None or stresses.attrs["location"] == b"node" else "Cell"
         fields = [_attribute(path.name, "node_mass", file["mesh/node_mass"], "Node")]
         steps = []
         for mode, frequency in zip(shapes, file["modes/frequency"][()]):
-            stress = _attribute(path.name, f"stress_{mode}", stresses[mode], center)
-            fields += [_attribute(path.name, f"mode_{mode}", shapes[mode], "Node"), stress]
+            fields.append(_attribute(path.name, f"mode_{mode}", shapes[mode], "Node"))
+            lines = [_attribute(path.name, "displacement", shapes[mode], "Node")]
+            if stresses is not None:
+                fields.append(_attribute(path.name, f"stress_{mode}", stresses[mode], center))
+                lines.append(_attribute(path.name, "stress", stresses[mode], center))
+            lines = "\n".join(lines)
             steps.append(f'<Grid Name="mode_{mode}">\n{_MESH_OF_FIRST_GRID}\n<Time Value="{frequency:.9g}"/>\n'
-                         f'{_attribute(path.name, "displacement", shapes[mode], "Node")}\n'
-                         f'{_attribute(path.name, "stress", stresses[mode], center)}\n</Grid>')
+                         f'{lines}\n</Grid>')
     single, series = path.with_suffix(".xdmf"), path.with_suffix(".modes.xdmf")
     lines = "\n".join(fields)
     single.write_text(f'<Xdmf Version="3.0"><Domain><Grid Name="modes">\n{mesh}\n{lines}\n</Grid></Domain></Xdmf>\n')

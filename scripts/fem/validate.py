@@ -1,6 +1,6 @@
 """Checks a modal file against the rules of schema `flexible-body-modes` 1.0, from the file alone.
 
-Nothing here is shared with the solid model: inertia is recomputed from nodal masses and displacements. Rust's reader
+Nothing here is shared with what computes a file: inertia is recomputed from nodal masses and displacements. Rust's reader
 applies the same rules; this one tells a generator before a file is used.
 """
 import dataclasses
@@ -9,12 +9,15 @@ import h5py
 import numpy as np
 
 from .geometric import LOADS
+from .lumped import rotary_matrices
 from .modal_file import COMPRESS_ABOVE, FORMAT, VERSION, datasets, digest
 
 BOUNDARIES = ("cantilever", "free-free", "craig-bampton", "general")
 NODE_MASS_KINDS = ("row_sum", "row_sum_signed", "hrz", "solver")
 COUPLINGS = ("fixed", "rbe3", "rbe2")
-CELL_NODES = {"tetra": 4, "tetra10": 10, "hexahedron": 8, "hexahedron20": 20, "hexahedron27": 27}
+CELL_NODES = {"tetra": 4, "tetra10": 10, "hexahedron": 8, "hexahedron20": 20, "hexahedron27": 27, "wedge": 6, "wedge15": 15,
+              "pyramid": 5, "pyramid13": 13, "triangle": 3, "triangle6": 6, "quad": 4, "quad8": 8, "quad9": 9, "line": 2, "vertex": 1}
+_OPEN = ("triangle", "triangle6", "quad", "quad8", "quad9", "line", "vertex")      # cells whose surface need not be closed
 _TYPES = ("<f8", "<f4", "<i8", "|u1")
 _ROUNDING = 1e-12       # sums of a few thousand terms
 _PERMUTATION = np.zeros((3, 3, 3))
@@ -89,6 +92,10 @@ def _structure(file):
     if "modes/stress" in file:
         rows = {"node": nodes, "cell": len(cells)}[_text(file["modes/stress"], "location")]
         shapes |= {f"modes/stress/{mode:04d}": (rows, 6) for mode in range(modes)}
+    if "modes/rotation" in file:
+        shapes |= {f"modes/rotation/{mode:04d}": (nodes, 3) for mode in range(modes)}
+    if "mesh/node_inertia" in file:
+        shapes |= {"mesh/node_inertia": (nodes, 6), "inertia/angular_momentum": (modes, 3), "inertia/modal_mass": (modes, modes)}
     if "geometric" in file:
         shapes["geometric/stiffness"] = (len(LOADS), modes, modes)
         rules.append(_truth("geometric loads named", _text(file["geometric/stiffness"], "loads").split() == list(LOADS)))
@@ -104,7 +111,7 @@ def _structure(file):
     rules.append(_truth("cells: type and node numbers",
                         cells.shape[1] == CELL_NODES[_text(cells, "cell_type")] and _in_range(cells, nodes)))
     rules.append(_truth("surface triangles use leading nodes",
-                        _in_range(file["mesh/surface_triangles"], int(file["mesh/points"].attrs["surface_nodes"]))))
+                        not len(file["mesh/surface_triangles"]) or _in_range(file["mesh/surface_triangles"], int(file["mesh/points"].attrs["surface_nodes"]))))
     rules.append(_truth("boundary, node mass kind and root known", _text(file, "boundary") in BOUNDARIES
                         and _text(file["mesh/node_mass"], "kind") in NODE_MASS_KINDS
                         and _text(file, "root_interface") in file["interfaces"]))
@@ -129,7 +136,13 @@ class _Contents:
         self.single_precision = file["modes/displacement/0000"].dtype.itemsize == 4
         self.mass, self.center, self.inertia = (file[f"body/{name}"][()] for name in ("mass", "center_of_mass", "inertia"))
         self.momentum, self.first, self.second = (file[f"inertia/{name}"][()] for name in ("momentum", "first_moment", "second_moment"))
-        self.angular = np.einsum("abc,jbc->ja", _PERMUTATION, self.first)
+        self.closed = _text(file["mesh/cells"], "cell_type") not in _OPEN
+        self.angular, self.modal_mass = np.einsum("abc,jbc->ja", _PERMUTATION, self.first), np.einsum("jkaa->jk", self.second)
+        self.rotary, self.rotation = None, None
+        if "mesh/node_inertia" in file:
+            self.angular, self.modal_mass = file["inertia/angular_momentum"][()], file["inertia/modal_mass"][()]
+            self.rotary = rotary_matrices(file["mesh/node_inertia"][()])
+            self.rotation = np.array([file[f"modes/rotation/{mode:04d}"][()] for mode in range(len(self.frequency))], float)
         self.interfaces = {name: {key: item[()] for key, item in group.items()} for name, group in file["interfaces"].items()}
         self.root = self.interfaces[_text(file, "root_interface")]
         self.geometric = file["geometric/stiffness"][()] if "geometric" in file else None
@@ -154,7 +167,7 @@ class _Contents:
         count = len(self.frequency)
         yield _truth("frequencies positive and ascending", (self.frequency > 0).all() and (np.diff(self.frequency) >= 0).all())
         yield _truth("damping not negative", (self.damping >= 0).all())
-        yield Rule("modes orthonormal", np.abs(np.einsum("jkaa->jk", self.second) - np.eye(count)).max(), 1e-6)
+        yield Rule("modes orthonormal", np.abs(self.modal_mass - np.eye(count)).max(), 1e-6)
         yield Rule("second moment symmetric", np.abs(self.second - self.second.transpose(1, 0, 3, 2)).max(), _ROUNDING)
         yield Rule("effective masses within the mass", ((self.momentum ** 2).sum(0) / self.mass).max(), 1 + 1e-9)
         yield Rule("effective inertias within the inertia", ((self.angular ** 2).sum(0) / np.diag(self.inertia)).max(), 1 + 1e-9)
@@ -167,11 +180,14 @@ class _Contents:
         exact = (1e-6 if self.single_precision else 1e-9) if self.exact_masses else 1e-2
         mass, points = self.node_mass, self.points
         squared = np.einsum("n,na,nb->ab", mass, points, points)
-        lumped_inertia = np.trace(squared) * np.eye(3) - squared
+        lumped_inertia = np.trace(squared) * np.eye(3) - squared + (0.0 if self.rotary is None else self.rotary.sum(0))
         momentum = np.einsum("n,jna->ja", mass, self.displacement)
         first = np.einsum("n,na,jnb->jab", mass, points, self.displacement, optimize=True)
         weighted = (self.displacement * mass[:, None]).reshape(len(self.frequency), -1)
         gram = weighted @ self.displacement.reshape(len(self.frequency), -1).T
+        if self.rotary is not None:
+            turning = np.einsum("nab,jnb->jna", self.rotary, self.rotation).reshape(len(gram), -1)
+            gram = gram + turning @ self.rotation.reshape(len(gram), -1).T
         yield Rule("node masses sum to the mass", abs(mass.sum() / self.mass - 1), 1e-9)
         yield Rule("node masses balance about the centre of mass",
                    np.abs(mass @ points - self.mass * self.center).max() / (self.mass * self.size), 1e-9 if self.exact_masses else 1e-2)
@@ -182,6 +198,8 @@ class _Contents:
         yield Rule("lumped first moment", np.abs(first - self.first).max() / np.sqrt(self.largest_inertia), 1e-2, 1e-3)
 
     def _surface(self):
+        if not self.closed:
+            return
         a, b, c = (self.points[self.triangles[:, corner]] for corner in range(3))
         yield _truth("surface triangles face outward", np.einsum("ta,ta->", a, np.cross(b, c)) > 0)
 
