@@ -157,6 +157,43 @@ fn a_target_that_cannot_be_written_is_refused_with_the_reason() {
     assert!(text.contains("run.h5/folder: cannot be written: Not a directory"), "{text}");
 }
 
+#[test]
+fn arrays_that_cannot_be_written_are_refused_with_the_reason() {
+    let (folder, run) = run_of(PANELS);
+    std::fs::create_dir_all(folder.path().join("run_xdmf/fields.h5")).unwrap();
+    let text = refused(&["export", run.to_str().unwrap(), "--format", "xdmf"]);
+    assert!(text.contains("run_xdmf/fields.h5: cannot be written: Is a directory"), "{text}");
+}
+
+#[test]
+fn a_run_without_anything_to_draw_is_refused_with_what_there_is_instead() {
+    let folder = tempfile::tempdir().unwrap();
+    let (scene, run) = (folder.path().join("scene.toml"), folder.path().join("run.h5"));
+    let body = "[[body]]\nname = \"hub\"\nmass = 1.0\ninertia = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]\n";
+    let hinge = "[[hinge]]\nname = \"base\"\nkind = \"free\"\nparent = \"world\"\nchild = \"hub\"\n";
+    std::fs::write(&scene, format!("{body}{hinge}[simulation]\nduration = 0.1\n[output]\nhinges = []\n")).unwrap();
+    assert!(pliant(&["run", scene.to_str().unwrap(), "--out", run.to_str().unwrap()]).status.success());
+    let text = refused(&["export", run.to_str().unwrap(), "--format", "xdmf"]);
+    let end = "run.h5: found neither flexible bodies nor loads, expected at least one of them; export the histories with --format csv";
+    assert!(text.ends_with(end), "{text}");
+}
+
+#[test]
+fn cells_that_xdmf_does_not_name_are_refused_with_those_that_it_does() {
+    let folder = tempfile::tempdir().unwrap();
+    let modal = folder.path().join("panel.h5");
+    std::fs::copy(format!("{ROOT}/modes/panel_cantilever.h5"), &modal).unwrap();
+    let file = hdf5::File::open_rw(&modal).unwrap();
+    let cells = file.dataset("mesh/cells").unwrap();
+    cells.delete_attr("cell_type").unwrap();
+    let word: hdf5::types::FixedAscii<16> = hdf5::types::FixedAscii::from_ascii("polyhedron").unwrap();
+    cells.new_attr::<hdf5::types::FixedAscii<16>>().create("cell_type").unwrap().write_scalar(&word).unwrap();
+    drop((cells, file));
+    let text = refused(&["modes", modal.to_str().unwrap(), "--export", "xdmf"]);
+    assert!(text.contains("panel.h5: mesh/cells@cell_type: found \"polyhedron\", expected one of: vertex, line, "), "{text}");
+    assert!(text.ends_with("write the mesh with one of these"), "{text}");
+}
+
 /// A scene of one panel whose modal file lies beside it.
 fn scene_beside_its_modal_file(folder: &Path) -> (PathBuf, PathBuf) {
     let (scene, modal) = (folder.join("scene.toml"), folder.join("panel.h5"));

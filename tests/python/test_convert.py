@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 import scipy.sparse
 from convert import nastran
-from fem import generate, validate
+from fem import validate
 
 ROOT = Path(__file__).resolve().parents[2]
 PROGRAM = ROOT / "target" / "release" / "pliant"
@@ -288,8 +288,8 @@ def fem(computed_panel):
 
 @pytest.fixture(scope="module")
 def computed_panel():
-    from conftest import BODIES
-    return generate.compute(BODIES["panel_cantilever"])
+    from conftest import _computed
+    return _computed("panel_cantilever")
 
 
 def save_hdf5(path, data):
