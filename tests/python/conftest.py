@@ -68,3 +68,17 @@ def tables():
 def modes_folder():
     """Folder of the committed files."""
     return MODES
+
+
+@pytest.fixture(scope="session")
+def panel():
+    """Arrays of the committed panel as other codes hold them: about another origin."""
+    from foreign_files import panel_arrays
+    return panel_arrays()
+
+
+@pytest.fixture(scope="session")
+def fem():
+    """The dictionary of an Exudyn FEM file of the panel."""
+    from foreign_files import fem_dictionary
+    return fem_dictionary(_computed("panel_cantilever"))

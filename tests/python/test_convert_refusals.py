@@ -11,7 +11,8 @@ from convert import assemble, exudyn, mesh, nastran
 from convert.choices import Choices
 from convert.errors import InputError
 from convert.foreign import Foreign
-from test_convert import fem, computed_panel, mbdyn_file, panel, refused, save_hdf5  # noqa: F401
+from foreign_files import mbdyn_file, save_hdf5
+from test_convert import refused
 
 CHOICES = Choices(root="1-4", interfaces={}, boundary="cantilever", damping_ratio=[0.0], length_unit=1.0, mass_unit=1.0)
 
@@ -127,14 +128,14 @@ def test_meshes_without_volume_have_no_density(tmp_path):
     (lambda data: {"modeBasis": {"matrix": np.zeros((6273, 2))}}, "modeBasis/matrix: found modes that depend on each other, expected independent modes; compute fewer modes"),
     (lambda data: {"nodes": np.zeros(3)}, "nodes: found ndarray, expected a dictionary with Position; write the file with FEMinterface.SaveToFile"),
 ])
-def test_matrices_of_exudyn_that_do_not_fit_are_refused(change, message, fem, tmp_path):  # noqa: F811
+def test_matrices_of_exudyn_that_do_not_fit_are_refused(change, message, fem, tmp_path):
     path = save_hdf5(tmp_path / "fem.hdf5", {**fem, **change(fem)})
     with pytest.raises(InputError) as refusal:
         exudyn.read(path)
     assert str(refusal.value) == f"{path}: {message}"
 
 
-def test_matrices_of_mbdyn_that_do_not_fit_are_refused(panel, tmp_path, capsys):  # noqa: F811
+def test_matrices_of_mbdyn_that_do_not_fit_are_refused(panel, tmp_path, capsys):
     path = tmp_path / "panel.fem"
     options = ["--root", "1", "--boundary", "general", "--damping-ratio", "0"]
     text = lambda matrix: "\n".join(" ".join(map(repr, row.tolist())) for row in matrix)
@@ -147,7 +148,7 @@ def test_matrices_of_mbdyn_that_do_not_fit_are_refused(panel, tmp_path, capsys):
     assert "absent.fem: file: found nothing to read (No such file or directory)" in refused(["mbdyn", "absent.fem", *options], capsys)
 
 
-def test_a_node_mass_file_must_be_an_array(panel, tmp_path, capsys):  # noqa: F811
+def test_a_node_mass_file_must_be_an_array(panel, tmp_path, capsys):
     path = mbdyn_file(panel, tmp_path / "panel.fem")
     (tmp_path / "mass.npy").write_text("1 2 3")
     message = refused(["mbdyn", path, "--root", "1", "--boundary", "general", "--damping-ratio", "0", "--node-mass", tmp_path / "mass.npy"], capsys)
