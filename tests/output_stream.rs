@@ -89,6 +89,7 @@ fn hub_with_two_panels() -> Result<(System, State, OutputPlan), Box<dyn Error>> 
             body: "left".into(),
             path: "modes/panel_cantilever.h5".into(),
             content_sha256: "ab".repeat(32),
+            residual_modes: None,
         }],
         hinges: vec![left, right],
         surfaces: vec![surface_of(left), surface_of(right)],

@@ -190,3 +190,26 @@ fn the_key_is_refused_where_it_cannot_be_and_its_modes_are_named() {
     assert_eq!((names[5].as_str(), names[6].as_str()), ("mode 6", "residual mode 1"));
     assert!(scene.left_out.iter().any(|l| l.starts_with("34 of 40 modes of \"inner\" (9 residual modes added)")), "{:?}", scene.left_out);
 }
+
+#[test]
+fn an_exported_run_deforms_by_its_residual_modes_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let displacement = |modes: &str| {
+        let (results, out) = (folder.path().join(format!("{modes}.h5")), folder.path().join(modes));
+        let (results, out) = (results.display().to_string(), out.display().to_string());
+        let slew = root().join(SLEW).display().to_string();
+        run(&["run", &slew, "--modes", modes, "--duration", "1.5", "--out", &results]);
+        let exported = run(&["export", &results, "--format", "xdmf", "--out", &out, "--body", "inner"]);
+        let files: Vec<_> = exported["files"].as_array().unwrap().iter().map(|f| f.as_str().unwrap().to_owned()).collect();
+        let heavy = files.iter().find(|f| f.ends_with(".h5")).unwrap();
+        let file = hdf5::File::open(heavy).unwrap();
+        let group = file.group("inner/displacement_body").unwrap();
+        let last = group.member_names().unwrap().into_iter().max().unwrap();
+        group.dataset(&last).unwrap().read_2d::<f32>().unwrap()
+    };
+    let (few, all) = (displacement("6"), displacement("40"));
+    let largest = all.iter().fold(0.0_f32, |m, x| m.max(x.abs()));
+    let worst = few.iter().zip(&all).fold(0.0_f32, |m, (a, b)| m.max((a - b).abs()));
+    // 2e-2 without residual modes; with them what the local shape of higher modes leaves
+    assert!(worst < 1e-3 * largest, "{worst:e} of {largest:e}");
+}

@@ -59,7 +59,7 @@ pub struct SeriesSpec {
 }
 
 /// A small fixed group of texts and bytes.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Preface {
     /// Attributes of the root.
     pub attributes: Vec<(&'static str, String)>,
@@ -67,6 +67,8 @@ pub struct Preface {
     pub bytes: Vec<(String, Vec<u8>)>,
     /// Groups with attributes.
     pub groups: Vec<(String, Vec<(&'static str, String)>)>,
+    /// Matrices.
+    pub matrices: Vec<(String, nalgebra::DMatrix<f64>)>,
 }
 
 /// A name as a single step of a path: `%`, `/` and the names `.` and `..` are percent-encoded.
@@ -243,6 +245,12 @@ fn write_preface(file: &hdf5::File, preface: &Preface) -> hdf5::Result<()> {
         let (above, name) = parent(file, path)?;
         let group = if above.link_exists(name) { above.group(name)? } else { above.create_group(name)? };
         attributes.iter().try_for_each(|(name, text)| write_text(&group, name, text))?;
+    }
+    for (path, matrix) in &preface.matrices {
+        let (group, name) = parent(file, path)?;
+        // rows first in the file, columns first in memory
+        let rows = matrix.transpose();
+        group.new_dataset::<f64>().shape((matrix.nrows(), matrix.ncols())).create(name)?.write_raw(rows.as_slice())?;
     }
     Ok(())
 }

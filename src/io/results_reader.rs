@@ -6,6 +6,7 @@ use super::array::GuardedDataset;
 use super::error::ModalFileError;
 use super::guard::GuardedFile;
 use super::results_file::ResultsError;
+use nalgebra::DMatrix;
 use std::ops::Range;
 use std::path::Path;
 
@@ -35,7 +36,7 @@ impl Series {
 }
 
 /// A modal file that the run used.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct UsedModalFile {
     /// Name of the body as a step of a path, escaped.
     pub body: String,
@@ -43,6 +44,8 @@ pub struct UsedModalFile {
     pub path: String,
     /// Digest of its content.
     pub content_sha256: String,
+    /// Residual modes over all modes of the file, one column each; none without.
+    pub residual_modes: Option<DMatrix<f64>>,
 }
 
 /// An open results file.
@@ -109,7 +112,15 @@ impl ResultsReader {
         let used = |body: &str| {
             let group = format!("{USED}/{body}");
             let (path, content_sha256) = (file.text(&group, "path")?, file.text(&group, "content_sha256")?);
-            Ok(UsedModalFile { body: body.to_owned(), path, content_sha256 })
+            let residual = format!("{group}/residual_modes");
+            let residual_modes = if file.has(&residual) {
+                let dataset = file.dataset(&residual)?.expect_shape(&[None, None], "(modes of the file, residual modes)")?;
+                let (rows, columns) = (dataset.shape[0], dataset.shape[1]);
+                Some(DMatrix::from_row_slice(rows, columns, &dataset.read_f64()?))
+            } else {
+                None
+            };
+            Ok(UsedModalFile { body: body.to_owned(), path, content_sha256, residual_modes })
         };
         let modal_files = file.children(USED).into_iter().map(used).collect::<Result<_, ModalFileError>>()?;
         Ok(Self { series, scene_name, modal_files, rows, file })

@@ -5,11 +5,12 @@ pub use crate::scene::Monitor;
 use crate::model::left_out::LeftOutModes;
 use crate::model::surface::StressModes;
 use crate::model::{Surface, System};
+use nalgebra::DMatrix;
 use std::sync::Arc;
 use thiserror::Error;
 
 /// A modal file that a scene uses, as the results file keeps it.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct ModalFileRecord {
     /// Name of the body.
     pub body: String,
@@ -17,6 +18,8 @@ pub struct ModalFileRecord {
     pub path: String,
     /// Digest of the file's data, lower-case hexadecimal.
     pub content_sha256: String,
+    /// Residual modes over all modes of the file, one column each; none without.
+    pub residual_modes: Option<DMatrix<f64>>,
 }
 
 /// The surface of a flexible body.

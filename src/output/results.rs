@@ -134,6 +134,9 @@ fn preface(plan: &OutputPlan) -> Preface {
         let attributes = vec![("path", record.path.clone()), ("content_sha256", record.content_sha256.clone())];
         (format!("scene/modal_files/{}", escape(&record.body)), attributes)
     };
+    let residual = |record: &super::plan::ModalFileRecord| {
+        Some((format!("scene/modal_files/{}/residual_modes", escape(&record.body)), record.residual_modes.clone()?))
+    };
     Preface {
         attributes: vec![
             ("format", FORMAT.into()),
@@ -143,5 +146,6 @@ fn preface(plan: &OutputPlan) -> Preface {
         ],
         bytes: vec![("scene/toml".into(), plan.scene_text.clone().into_bytes())],
         groups: plan.modal_files.iter().map(modal_file).collect(),
+        matrices: plan.modal_files.iter().filter_map(residual).collect(),
     }
 }

@@ -25,6 +25,7 @@ pub fn plan(scene: &Scene, picture: bool) -> Result<OutputPlan, ModalFileError> 
             body: scene.system.bodies[*body].name.clone(),
             path: selection.file.path().display().to_string(),
             content_sha256: selection.content_sha256.clone(),
+            residual_modes: selection.basis.has_residual().then(|| selection.basis.residual.clone()),
         });
         let has_stress = selection.file.stress_location()?.is_some();
         let stress = has_stress && selection.basis.mode_count() > 0 && (scene.stress.contains(body) || monitored(*body));

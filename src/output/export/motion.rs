@@ -11,9 +11,9 @@ use super::{BLOCK_ROWS, Exported, check_target};
 use crate::io::ResultsReader;
 use crate::io::field_file::FieldFile;
 use crate::io::results_reader::UsedModalFile;
-use crate::model::Surface;
+use crate::model::{ModeBasis, Surface};
 use crate::spatial::rotation::{matrix_of_quaternion, normalized};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{DMatrix, Matrix3, Vector3};
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
@@ -140,19 +140,19 @@ struct BodyTrack {
 impl BodyTrack {
     fn of(results: &ResultsReader, used: &UsedModalFile, modal: &crate::io::ModalFile, name: String) -> Result<Self, ExportError> {
         let group = format!("bodies/{}", used.body);
-        let modes = match results.find(&format!("{group}/modal_position")) {
+        let basis = match results.find(&format!("{group}/modal_position")) {
             // a flexible body that the run made rigid
-            None => Vec::new(),
+            None => ModeBasis::whole(Vec::new(), modal.header().mode_count),
             Some(series) => {
-                mode_numbers(series.text("components").unwrap_or_default(), series.width).ok_or_else(|| ExportError::WrongText {
+                basis(series.text("components").unwrap_or_default(), series.width, used, modal).ok_or_else(|| ExportError::WrongText {
                     file: results.path().to_owned(),
                     object: format!("{}@components", series.path),
                     found: format!("\"{}\"", series.text("components").unwrap_or_default()),
-                    expected: "\"mode N\" for each of its numbers",
+                    expected: "\"mode N\" or \"residual mode N\" for each of its numbers, of the modes that are there",
                 })?
             }
         };
-        Ok(Self { label: unescape(&used.body), name, group, surface: modal.read_surface(&modes)? })
+        Ok(Self { label: unescape(&used.body), name, group, surface: modal.read_surface_in(&basis)? })
     }
 
     fn write(&self, results: &ResultsReader, every: usize, fields: &mut FieldFile) -> Result<(), ExportError> {
@@ -311,6 +311,18 @@ fn step_name(step: usize) -> String {
 
 fn rotation(quaternion: &[f64]) -> Matrix3<f64> {
     matrix_of_quaternion(&normalized(&[quaternion[0], quaternion[1], quaternion[2], quaternion[3]]))
+}
+
+/// The modes that a run retained: those named, and the residual modes that the results file keeps.
+fn basis(names: &str, width: Option<usize>, used: &UsedModalFile, modal: &crate::io::ModalFile) -> Option<ModeBasis> {
+    let available = modal.header().mode_count;
+    let residual = used.residual_modes.clone().unwrap_or_else(|| DMatrix::zeros(available, 0));
+    let count = width?.checked_sub(residual.ncols())?;
+    let whole: Vec<_> = names.split(',').take(count).collect();
+    let rest = names.split(',').skip(count).all(|name| name.trim().starts_with("residual mode "));
+    let whole = if count == 0 { Vec::new() } else { mode_numbers(&whole.join(","), Some(count))? };
+    let exist = whole.iter().all(|j| *j < available);
+    (rest && exist && residual.nrows() == available && names.split(',').count() == width?).then_some(ModeBasis { whole, residual })
 }
 
 /// 0-based numbers of "mode 1, mode 5", as many as the series has columns.
