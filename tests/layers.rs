@@ -7,9 +7,10 @@ use std::path::{Path, PathBuf};
 const LAYERS: [&str; 9] = ["spatial", "model", "dynamics", "integrate", "io", "scene", "output", "study", "cli"];
 
 /// Foreign crates that only some places may use.
-const CONFINED: [(&str, &[&str]); 8] = [
+const CONFINED: [(&str, &[&str]); 9] = [
     ("plotters", &["src/study/plot.rs"]),
     ("hdf5::", &["src/io/"]),
+    ("quick_xml", &["src/io/"]),
     ("rerun::", &["src/output/rerun.rs"]),
     ("clap", &["src/cli/"]),
     ("indicatif", &["src/cli/"]),

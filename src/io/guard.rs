@@ -63,6 +63,16 @@ impl GuardedFile {
         &self.path
     }
 
+    /// Another name in messages.
+    pub(super) fn show_as(&mut self, path: &Path) {
+        path.clone_into(&mut self.path);
+    }
+
+    /// Length of the file.
+    pub fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
     /// Walks the groups by name; a link that is not hard is refused wherever it stands.
     fn list(&mut self) -> Result<(), ModalFileError> {
         let mut open = vec![(String::new(), 0)];
@@ -135,8 +145,21 @@ impl GuardedFile {
         inside.filter_map(|(path, _)| path.strip_prefix(&prefix)).filter(|name| !name.contains('/')).collect()
     }
 
+    /// Names directly under the root.
+    pub(super) fn children_of_root(&self) -> impl Iterator<Item = &str> {
+        self.catalogue.keys().map(String::as_str).filter(|path| !path.contains('/'))
+    }
+
     /// Opens a dataset after all checks that need no expectation.
     pub fn dataset(&self, path: &str) -> Result<GuardedDataset<'_>, ModalFileError> {
+        let dataset = self.open_dataset(path)?;
+        let element = self.element_type(path, &dataset)?;
+        let (shape, checksummed, chunked) = self.storage(path, &dataset, element.bytes())?;
+        Ok(GuardedDataset { file: self, path: path.to_owned(), dataset, element, shape, checksummed, chunked })
+    }
+
+    /// A dataset by path, nothing checked but that it is one.
+    pub(super) fn open_dataset(&self, path: &str) -> Result<hdf5::Dataset, ModalFileError> {
         let expected = "a dataset";
         match self.catalogue.get(path) {
             Some(ObjectKind::Dataset) => {}
@@ -145,10 +168,7 @@ impl GuardedFile {
                 return Err(ModalFileError::Missing { file: self.path.clone(), object: path.to_owned(), expected: expected.to_owned() });
             }
         }
-        let dataset = self.file.dataset(path).map_err(|e| self.unreadable(path, &e))?;
-        let element = self.element_type(path, &dataset)?;
-        let (shape, checksummed, chunked) = self.storage(path, &dataset, element)?;
-        Ok(GuardedDataset { file: self, path: path.to_owned(), dataset, element, shape, checksummed, chunked })
+        self.file.dataset(path).map_err(|e| self.unreadable(path, &e))
     }
 
     /// The element type, or a refusal that names what was found.
@@ -168,7 +188,7 @@ impl GuardedFile {
     }
 
     /// Layout, filters and sizes; returns the shape, whether a checksum guards the data and whether it is chunked.
-    fn storage(&self, path: &str, dataset: &hdf5::Dataset, element: ElementType) -> Result<(Vec<usize>, bool, bool), ModalFileError> {
+    pub(super) fn storage(&self, path: &str, dataset: &hdf5::Dataset, element: u64) -> Result<(Vec<usize>, bool, bool), ModalFileError> {
         use hdf5::plist::dataset_create::Layout;
         let elsewhere = |found| ModalFileError::Elsewhere { file: self.path.clone(), object: path.to_owned(), found };
         let unreadable = |e: &hdf5::Error| self.unreadable(path, e);
@@ -215,7 +235,7 @@ impl GuardedFile {
             if expected > CHUNK_COUNT_LIMIT {
                 return Err(incomplete(format!("{expected} chunks"), format!("at most {CHUNK_COUNT_LIMIT} chunks")));
             }
-            check_chunks(dataset, &shape, &chunk, &filters, element.bytes(), self.bytes).map_err(|f| incomplete(f.found, f.expected))?;
+            check_chunks(dataset, &shape, &chunk, &filters, element, self.bytes).map_err(|f| incomplete(f.found, f.expected))?;
         } else if dataset.storage_size() < bytes {
             return Err(incomplete(format!("{} bytes", dataset.storage_size()), format!("{bytes} bytes")));
         }
@@ -223,13 +243,13 @@ impl GuardedFile {
     }
 
     /// Bytes of an array, refused on overflow or above the limit.
-    fn checked_bytes(&self, path: &str, shape: &[usize], element: ElementType, limit: u64) -> Result<u64, ModalFileError> {
-        let bytes = shape.iter().try_fold(element.bytes(), |product, &extent| product.checked_mul(u64::try_from(extent).ok()?));
+    fn checked_bytes(&self, path: &str, shape: &[usize], element: u64, limit: u64) -> Result<u64, ModalFileError> {
+        let bytes = shape.iter().try_fold(element, |product, &extent| product.checked_mul(u64::try_from(extent).ok()?));
         bytes.filter(|&bytes| bytes <= limit).ok_or_else(|| self.too_large(path, shape, element, limit))
     }
 
-    fn too_large(&self, path: &str, shape: &[usize], element: ElementType, limit: u64) -> ModalFileError {
-        let found = format!("{} elements of {} bytes", tuple(shape), element.bytes());
+    fn too_large(&self, path: &str, shape: &[usize], element: u64, limit: u64) -> ModalFileError {
+        let found = format!("{} elements of {element} bytes", tuple(shape));
         ModalFileError::TooLarge { file: self.path.clone(), object: path.to_owned(), found, limit }
     }
 
@@ -273,7 +293,7 @@ impl GuardedFile {
     }
 
     /// An attribute of one element, and its name in messages.
-    fn attribute(&self, object: &str, name: &str, expected: &str) -> Result<(String, hdf5::Attribute), ModalFileError> {
+    pub(super) fn attribute(&self, object: &str, name: &str, expected: &str) -> Result<(String, hdf5::Attribute), ModalFileError> {
         let shown = format!("{object}@{name}");
         let missing =
             || ModalFileError::Missing { file: self.path.clone(), object: shown.clone(), expected: format!("{expected} attribute") };
@@ -340,7 +360,7 @@ fn is_unicode(datatype: &Datatype) -> bool {
 }
 
 /// The name of an integer type, if it is one.
-fn integer_name(datatype: &Datatype) -> Option<&'static str> {
+pub(super) fn integer_name(datatype: &Datatype) -> Option<&'static str> {
     let signed = [("i1", datatype.is::<i8>()), ("i2", datatype.is::<i16>()), ("i4", datatype.is::<i32>()), ("i8", datatype.is::<i64>())];
     let unsigned = [("u1", datatype.is::<u8>()), ("u2", datatype.is::<u16>()), ("u4", datatype.is::<u32>()), ("u8", datatype.is::<u64>())];
     signed.into_iter().chain(unsigned).find(|&(_, found)| found).map(|(name, _)| name)
@@ -350,7 +370,7 @@ fn integer_name(datatype: &Datatype) -> Option<&'static str> {
 ///
 /// By comparison with known types: the wrapper's own descriptor copies a nested type once per level, which takes gigabytes for
 /// the thousands of levels that fit into one header message.
-fn describe(datatype: &Datatype) -> String {
+pub(super) fn describe(datatype: &Datatype) -> String {
     if let Some(name) = integer_name(datatype) {
         name.to_owned()
     } else if datatype.is::<f32>() {

@@ -48,6 +48,8 @@ pub struct Header {
     pub content_sha256: String,
     /// How the nodal masses were made.
     pub node_mass_kind: NodeMassKind,
+    /// Where the tensors are sums over nodes: by how much the modes of the source departed from orthonormality with these masses.
+    pub lumping_departure: Option<f64>,
 }
 
 /// Reads and understands every attribute that the schema requires of the file as a whole.
@@ -127,5 +129,27 @@ pub(super) fn read_header(file: &GuardedFile) -> Result<Header, ModalFileError> 
         surface_nodes,
         content_sha256,
         node_mass_kind,
+        lumping_departure: lumping_departure(file)?,
     })
+}
+
+/// Optional attributes of `inertia`: where the tensors come from, and the figure that belongs to it.
+fn lumping_departure(file: &GuardedFile) -> Result<Option<f64>, ModalFileError> {
+    match file.text("inertia", "source") {
+        Err(ModalFileError::Missing { .. }) => return Ok(None),
+        Ok(word) if word == "lumped" => {}
+        Ok(_) => return Ok(None),
+        Err(error) => return Err(error),
+    }
+    let text = file.text("inertia", "departure")?;
+    match text.parse::<f64>() {
+        Ok(value) if (0.0..=1e100).contains(&value) => Ok(Some(value)),
+        _ => Err(ModalFileError::WrongValue {
+            file: file.path().to_owned(),
+            object: "inertia@departure".to_owned(),
+            found: format!("\"{text}\""),
+            expected: "a number of zero or more".to_owned(),
+            remedy: "import the body again",
+        }),
+    }
 }

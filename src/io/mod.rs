@@ -1,4 +1,5 @@
-//! Files to model types and back: the only layer that opens HDF5 files. It holds no physics and uses `model` alone.
+//! Files to model types and back: the only layer that opens HDF5 files. It uses `model` alone, and holds no physics but the nodal sums that
+//! turn the files of other codes into modal files ([`import`]).
 //! [`results_file`] writes time histories and [`results_reader`] reads them back; what they mean is the business of the layer above.
 //! [`field_file`] writes the arrays that exported pictures point into.
 //!
@@ -19,14 +20,17 @@ mod chunks;
 mod digest;
 pub mod error;
 pub mod field_file;
+mod foreign;
 mod guard;
 pub mod header;
 pub mod health;
+pub mod import;
 mod lumped;
 pub mod modal_check;
 pub mod modal_file;
 pub mod modal_layout;
 pub mod modal_mesh;
+mod modal_writer;
 pub mod results_file;
 pub mod results_reader;
 

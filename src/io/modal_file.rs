@@ -82,6 +82,8 @@ pub struct InterfaceSupport {
 pub struct ModalFile {
     pub(super) file: GuardedFile,
     header: Header,
+    /// Takes the file away with this value, where it was made for it alone; after `file`, so that it is closed first.
+    _scratch: Option<tempfile::TempPath>,
 }
 
 impl ModalFile {
@@ -92,7 +94,13 @@ impl ModalFile {
     pub fn open(path: &Path) -> Result<Self, ModalFileError> {
         let file = GuardedFile::open(path)?;
         let header = read_header(&file)?;
-        Ok(Self { file, header })
+        Ok(Self { file, header, _scratch: None })
+    }
+
+    /// The same file, known as `shown`; what is at `scratch`, where it was made for this value alone, goes away with it.
+    pub(super) fn made_from(mut self, shown: &Path, scratch: tempfile::TempPath) -> Self {
+        self.file.show_as(shown);
+        Self { _scratch: Some(scratch), ..self }
     }
 
     /// Opens a file, reads all of it and holds it against every rule of the schema.

@@ -277,7 +277,7 @@ fn create_series(file: &hdf5::File, spec: &SeriesSpec) -> hdf5::Result<Dataset> 
 }
 
 /// A text attribute of fixed length, cut at 4 KiB.
-fn write_text(location: &Location, name: &str, text: &str) -> hdf5::Result<()> {
+pub(super) fn write_text(location: &Location, name: &str, text: &str) -> hdf5::Result<()> {
     let mut end = text.len().min(TEXT_LIMIT);
     while !text.is_char_boundary(end) {
         end -= 1;
