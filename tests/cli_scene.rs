@@ -81,7 +81,7 @@ fn faults_of_a_scene_are_named_with_line_key_and_remedy_and_exit_2() {
         ("mass = 2.0", "mass = \"2 kg\"", &["line 11", "invalid type: string", "expected f64"]),
         ("mass = 2.0", "mass = nan", &["scene.toml:11:8", "body[2].mass", "not finite"]),
         ("mass = 2.0", "mass = -2.0", &["scene.toml:11:8", "\"bob\"", "-2", "zero or positive"]),
-        ("mass = 2.0\n", "", &["body[2]", "needs mass and inertia (rigid) or modal_file (flexible)"]),
+        ("mass = 2.0\n", "", &["body[2]", "needs mass and inertia (rigid), or modal_file or import (flexible)"]),
         ("0.01, 0.0, 0.0]", "0.09, 0.0, 0.0]", &["\"bob\"", "principal values", "sum of the other two"]),
         ("parent = \"boom\"", "parent = \"bom\"", &["hinge[2].parent", "\"bom\" is not a body", "\"boom\", \"bob\""]),
         ("parent_node = \"tip\"", "parent_node = \"tp\"", &["hinge[2].parent_node", "\"tp\" is not an interface", "\"root\", \"tip\""]),

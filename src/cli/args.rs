@@ -28,6 +28,71 @@ pub enum Command {
     Modes(ModesArguments),
     /// Export a results file: motion, stress and loads for ParaView (XDMF), or histories as a table (CSV, Parquet)
     Export(ExportArguments),
+    /// Turn mode shapes of another code (XDMF or MED file) into a modal file
+    Import(ImportArguments),
+}
+
+/// Arguments of `pliant import`.
+#[derive(Debug, Args)]
+#[command(help_expected = true)]
+#[command(
+    after_help = "What is missing is asked for by name; nothing is made up. Give the rest by --keys: the keys of [body.import] in a scene."
+)]
+pub struct ImportArguments {
+    /// The file to import (.xdmf, .xmf, .med, .rmed)
+    #[arg(value_name = "FILE")]
+    pub file: PathBuf,
+    /// The modal file to write
+    #[arg(long, value_name = "BODY.h5")]
+    pub out: PathBuf,
+    /// File with the keys of [body.import] (TOML); the options below go before it
+    #[arg(long, value_name = "KEYS.toml")]
+    pub keys: Option<PathBuf>,
+    /// Title of the body [default: the file's name]
+    #[arg(long, value_name = "TEXT")]
+    pub title: Option<String>,
+    /// Mesh, where a MED file has several
+    #[arg(long, value_name = "NAME")]
+    pub mesh: Option<String>,
+    /// Field of the mode shapes, or a pattern such as "mode_*"
+    #[arg(long, value_name = "FIELD")]
+    pub displacement: Option<String>,
+    /// Field of nodal rotations, where the displacement field has none
+    #[arg(long, value_name = "FIELD")]
+    pub rotation: Option<String>,
+    /// Field of the stress of each mode
+    #[arg(long, value_name = "FIELD")]
+    pub stress: Option<String>,
+    /// Frequencies of the retained modes (Hz) [default: the times of the steps]
+    #[arg(long, value_name = "HZ,...", value_delimiter = ',', allow_negative_numbers = true)]
+    pub frequencies: Vec<f64>,
+    /// Steps to retain, counted from 1 [default: all]
+    #[arg(long, value_name = "N,...", value_delimiter = ',')]
+    pub modes: Vec<usize>,
+    /// Damping ratio of all modes, or of each
+    #[arg(long, value_name = "X,...", value_delimiter = ',', allow_negative_numbers = true)]
+    pub damping_ratio: Vec<f64>,
+    /// Density of all volume cells (kg/m^3); by groups in --keys
+    #[arg(long, value_name = "X", allow_negative_numbers = true)]
+    pub density: Option<f64>,
+    /// Mass per area of a mesh of surface cells (kg/m^2)
+    #[arg(long, value_name = "X", allow_negative_numbers = true)]
+    pub areal_density: Option<f64>,
+    /// Field of nodal masses (kg); a list in --keys
+    #[arg(long, value_name = "FIELD")]
+    pub node_mass: Option<String>,
+    /// How the modes were held: cantilever, free-free, craig-bampton or general [default: found from the root]
+    #[arg(long, value_name = "NAME")]
+    pub boundary: Option<String>,
+    /// Interface that carries the inboard hinge and becomes the origin [default: root]
+    #[arg(long, value_name = "NAME")]
+    pub root: Option<String>,
+    /// An interface by a group, or a box of least and greatest coordinates: NAME=GROUP or NAME=box:x,y,z,x,y,z (several times)
+    #[arg(long, value_name = "NAME=NODES", allow_hyphen_values = true)]
+    pub interface: Vec<String>,
+    /// Print the report as one JSON object
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// Arguments of `pliant check`.

@@ -12,6 +12,8 @@ mod eval;
 mod export;
 mod failure;
 #[cfg(feature = "hdf5")]
+mod import;
+#[cfg(feature = "hdf5")]
 mod modes;
 mod report;
 mod run;
@@ -60,8 +62,12 @@ fn run(arguments: Arguments, output: &mut dyn Write) -> Result<(), Failure> {
         Some(Command::Export(_)) => Err(Failure::input("this build cannot read results files; build with the feature \"hdf5\"")),
         #[cfg(feature = "hdf5")]
         Some(Command::Modes(arguments)) => modes::run(&arguments, output),
+        #[cfg(feature = "hdf5")]
+        Some(Command::Import(arguments)) => import::run(&arguments, output),
         #[cfg(not(feature = "hdf5"))]
-        Some(Command::Modes(_)) => Err(Failure::input("this build cannot read modal files; build with the feature \"hdf5\"")),
+        Some(Command::Modes(_) | Command::Import(_)) => {
+            Err(Failure::input("this build cannot read modal files; build with the feature \"hdf5\""))
+        }
     }
 }
 

@@ -6,7 +6,6 @@ use crate::model::Surface;
 use crate::model::{BodyKind, ModeBasis};
 use crate::scene::{Monitor, Scene};
 use std::collections::HashMap;
-use std::path::PathBuf;
 use std::rc::Rc;
 use std::sync::Arc;
 
@@ -17,7 +16,7 @@ use std::sync::Arc;
 pub fn plan(scene: &Scene, picture: bool) -> Result<OutputPlan, ModalFileError> {
     let monitored = |body: usize| scene.monitors.iter().any(|m| matches!(m, Monitor::Body { body: b, .. } if *b == body));
     // bodies of one file and one choice of modes share their basis
-    let mut shared: HashMap<(PathBuf, *const ModeBasis), Arc<Surface>> = HashMap::new();
+    let mut shared: HashMap<*const ModeBasis, Arc<Surface>> = HashMap::new();
     let mut surfaces = Vec::new();
     let mut modal_files = Vec::new();
     for (body, selection) in &scene.flexible {
@@ -30,7 +29,7 @@ pub fn plan(scene: &Scene, picture: bool) -> Result<OutputPlan, ModalFileError> 
         let has_stress = selection.file.stress_location()?.is_some();
         let stress = has_stress && selection.basis.mode_count() > 0 && (scene.stress.contains(body) || monitored(*body));
         if picture || stress {
-            let key = (selection.file.path().to_owned(), Rc::as_ptr(&selection.basis));
+            let key = Rc::as_ptr(&selection.basis);
             let surface = match shared.get(&key) {
                 Some(surface) => Arc::clone(surface),
                 None => {

@@ -284,7 +284,7 @@ pub(super) struct Assembly<'a> {
 }
 
 fn check_overrides(spec: &SceneSpec, overrides: &Overrides) -> Result<(), SceneError> {
-    let flexible: Vec<_> = spec.body.iter().filter(|b| b.modal_file.is_some()).map(|b| b.name.as_str()).collect();
+    let flexible: Vec<_> = spec.body.iter().filter(|b| b.is_flexible()).map(|b| b.name.as_str()).collect();
     if let Some(method) = overrides.closure_method.as_deref().filter(|m| !ClosureMethod::is_known(m)) {
         let message = format!("\"{method}\" is not a closure method; known: {}", ClosureMethod::NAMES.join(", "));
         return Err(SceneError::Override { option: "--closure-method", message });
@@ -418,11 +418,14 @@ impl Assembly<'_> {
             ("modal_position", !body.modal_position.is_empty()),
             ("modal_velocity", !body.modal_velocity.is_empty()),
         ];
-        let (foreign, needed) =
-            if body.modal_file.is_some() { (rigid_keys.as_slice(), "mass") } else { (flexible_keys.as_slice(), "modal_file") };
+        let (foreign, needed) = if body.is_flexible() { (rigid_keys.as_slice(), "mass") } else { (flexible_keys.as_slice(), "modal_file") };
         if let Some((key, _)) = foreign.iter().find(|(_, given)| *given) {
             let message = if needed == "mass" {
-                format!("body \"{}\" has a modal_file, which gives its mass properties; remove {key}", body.name)
+                format!(
+                    "body \"{}\" has {}, which gives its mass properties; remove {key}",
+                    body.name,
+                    if body.import.is_some() { "an import" } else { "a modal_file" }
+                )
             } else {
                 format!("body \"{}\" has no modal_file; {key} belongs to flexible bodies", body.name)
             };
@@ -431,11 +434,14 @@ impl Assembly<'_> {
         if let Some(size) = body.box_size.filter(|s| !s.iter().all(|x| *x > 0.0)) {
             return Err(self.source.value(&at("box"), format!("{size:?} must be three positive lengths")));
         }
-        match &body.modal_file {
-            Some(file) => self.flexible(index, body, file, spec),
-            None => {
+        if body.modal_file.is_some() && body.import.is_some() {
+            return Err(self.source.value(&at("import"), format!("body \"{}\" has a modal_file too; give one of both", body.name)));
+        }
+        match body.is_flexible() {
+            true => self.flexible(index, body, spec),
+            false => {
                 let Some(mass) = body.mass else {
-                    let message = format!("body \"{}\" needs mass and inertia (rigid) or modal_file (flexible)", body.name);
+                    let message = format!("body \"{}\" needs mass and inertia (rigid), or modal_file or import (flexible)", body.name);
                     return Err(self.source.value(&[Step::Key("body"), Step::Index(index)], message));
                 };
                 let rows = body.inertia.unwrap_or_default();
@@ -449,9 +455,10 @@ impl Assembly<'_> {
     }
 
     #[cfg(not(feature = "hdf5"))]
-    fn flexible(&mut self, index: usize, _body: &BodySpec, _file: &Path, _spec: &SceneSpec) -> Result<BodyDefinitionKind, SceneError> {
+    fn flexible(&mut self, index: usize, body: &BodySpec, _spec: &SceneSpec) -> Result<BodyDefinitionKind, SceneError> {
+        let key = if body.import.is_some() { "import" } else { "modal_file" };
         Err(self.source.value(
-            &[Step::Key("body"), Step::Index(index), Step::Key("modal_file")],
+            &[Step::Key("body"), Step::Index(index), Step::Key(key)],
             "this build reads no modal files; build with the feature \"hdf5\"",
         ))
     }

@@ -46,6 +46,17 @@ pub enum SceneError {
         /// What is wrong with it.
         source: crate::io::ModalFileError,
     },
+    /// A file of another code that cannot be imported.
+    #[cfg(feature = "hdf5")]
+    #[error("{}:{}:{}: {}", path.display(), at.line, at.column, at.key)]
+    Import {
+        /// The scene.
+        path: PathBuf,
+        /// Where.
+        at: Location,
+        /// What is wrong with it.
+        source: crate::io::import::ImportError,
+    },
     /// An override on the command line that names nothing.
     #[error("{option}: {message}")]
     Override {

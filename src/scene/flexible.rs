@@ -11,16 +11,25 @@ use nalgebra::Vector6;
 use std::path::Path;
 
 impl Assembly<'_> {
-    pub(super) fn flexible(
-        &mut self,
-        index: usize,
-        body: &BodySpec,
-        file: &Path,
-        spec: &SceneSpec,
-    ) -> Result<BodyDefinitionKind, SceneError> {
-        let steps = [Step::Key("body"), Step::Index(index), Step::Key("modal_file")];
-        let path = self.source.path.parent().unwrap_or(Path::new("")).join(file);
-        let (handle, full, content_sha256) = self.files.open(&path, self.source, &steps)?;
+    pub(super) fn flexible(&mut self, index: usize, body: &BodySpec, spec: &SceneSpec) -> Result<BodyDefinitionKind, SceneError> {
+        let folder = self.source.path.parent().unwrap_or(Path::new(""));
+        // what identifies the file for this scene: its path, and for an import what was asked of it
+        let (path, (handle, full, content_sha256)) = match &body.import {
+            None => {
+                let steps = [Step::Key("body"), Step::Index(index), Step::Key("modal_file")];
+                let path = folder.join(body.modal_file.as_deref().unwrap_or(Path::new("")));
+                let opened = self.files.open(&path, self.source, &steps)?;
+                (path, opened)
+            }
+            Some(import) => {
+                let steps = |key| [Step::Key("body"), Step::Index(index), Step::Key("import"), Step::Key(key)];
+                let Some(file) = &import.file else {
+                    return Err(self.source.value(&steps("file"), "name the XDMF or MED file to import"));
+                };
+                let options = import.options().map_err(|(key, message)| self.source.value(&steps(key), message))?;
+                self.files.import(&folder.join(file), &options, self.source, &steps("file"))?
+            }
+        };
         let whole = retained(self, index, body, &full.frequency_hz)?;
         let residual = self.residual(body, &whole, full.mode_count()).then(|| places(body, &full.root_interface, spec));
         let choice = Choice { whole, residual };

@@ -6,6 +6,7 @@ pub mod error;
 #[cfg(feature = "hdf5")]
 mod flexible;
 mod functions;
+pub mod import_spec;
 mod locate;
 #[cfg(feature = "hdf5")]
 mod modal_files;
@@ -14,4 +15,5 @@ pub mod spec;
 
 pub use assemble::{Monitor, Overrides, Scene};
 pub use error::SceneError;
+pub use import_spec::ImportSpec;
 pub use settings::Accuracy;

@@ -2,6 +2,7 @@
 
 use super::error::{SceneError, Source};
 use super::locate::Step;
+use crate::io::import::{ImportOptions, import};
 use crate::io::{ModalFile, ModalFileError};
 use crate::model::ModeBasis;
 use crate::model::flexible_body::ModalIntegrals;
@@ -28,10 +29,13 @@ pub struct Selection {
 /// Modal data of one choice of modes, plain and packed.
 type Packed = (Arc<ModalBody>, Arc<ModalIntegrals>);
 
+/// A file, its integrals and its digest.
+type Opened = (Rc<ModalFile>, Rc<ModalBody>, String);
+
 /// Files and selections read so far.
 #[derive(Debug, Clone, Default)]
 pub struct ModalFiles {
-    files: HashMap<PathBuf, (Rc<ModalFile>, Rc<ModalBody>, String)>,
+    files: HashMap<PathBuf, Opened>,
     bases: HashMap<(PathBuf, Choice), Rc<ModeBasis>>,
     packed: HashMap<(PathBuf, Choice, bool), Packed>,
 }
@@ -67,7 +71,7 @@ pub enum BasisError {
 
 impl ModalFiles {
     /// The file at `path`, checked.
-    pub fn open(&mut self, path: &Path, source: &Source, steps: &[Step]) -> Result<(Rc<ModalFile>, Rc<ModalBody>, String), SceneError> {
+    pub fn open(&mut self, path: &Path, source: &Source, steps: &[Step]) -> Result<Opened, SceneError> {
         if let Some(found) = self.files.get(path) {
             return Ok(found.clone());
         }
@@ -77,6 +81,26 @@ impl ModalFiles {
         let entry = (Rc::new(file), Rc::new(body), digest);
         self.files.insert(path.to_owned(), entry.clone());
         Ok(entry)
+    }
+
+    /// A file of another code, imported once for each set of options; with what identifies it.
+    pub fn import(
+        &mut self,
+        path: &Path,
+        options: &ImportOptions,
+        source: &Source,
+        steps: &[Step],
+    ) -> Result<(PathBuf, Opened), SceneError> {
+        let key = PathBuf::from(format!("{} {options:?}", path.display()));
+        if let Some(found) = self.files.get(&key) {
+            return Ok((key, found.clone()));
+        }
+        let wrap = |source_error| SceneError::Import { path: source.path.clone(), at: source.at(steps), source: source_error };
+        let (file, body) = import(path, options).map_err(wrap)?;
+        let digest = file.header().content_sha256.clone();
+        let entry = (Rc::new(file), Rc::new(body), digest);
+        self.files.insert(key.clone(), entry.clone());
+        Ok((key, entry))
     }
 
     /// The combinations of modes that `choice` asks for.

@@ -1,5 +1,6 @@
 //! The scene file as serde reads it: one struct per table, one field per key, nothing interpreted.
 
+use super::import_spec::ImportSpec;
 use serde::Deserialize;
 use std::path::PathBuf;
 
@@ -136,6 +137,8 @@ pub struct BodySpec {
     pub box_size: Option<[f64; 3]>,
     /// Modal file, relative to the scene.
     pub modal_file: Option<PathBuf>,
+    /// File of another code that is imported when the scene is loaded, in place of a modal file.
+    pub import: Option<ImportSpec>,
     /// Retained modes; all if none.
     pub modes: Option<ModesSpec>,
     /// Add residual modes that answer loads for the modes left out; not if none.
@@ -152,6 +155,14 @@ pub struct BodySpec {
     /// Initial modal rates.
     #[serde(default)]
     pub modal_velocity: Vec<f64>,
+}
+
+impl BodySpec {
+    /// True if the body has modes, from a modal file or a file to import.
+    #[must_use]
+    pub fn is_flexible(&self) -> bool {
+        self.modal_file.is_some() || self.import.is_some()
+    }
 }
 
 /// `[[hinge]]`
