@@ -23,7 +23,7 @@ pub struct ImportReport {
     pub sizes: (usize, usize),
     /// kg.
     pub mass: f64,
-    /// Largest departure of the file's modes from orthonormality with the nodal masses: what lumping changes, to first order.
+    /// Largest relative change of the modal mass of any combination of modes by the nodal masses: what lumping changes, to first order.
     pub departure: f64,
     /// What was taken over as it is.
     pub carried: Vec<String>,
@@ -126,7 +126,8 @@ fn write(file: &Path, options: &ImportOptions, out: &Path) -> Result<ImportRepor
     let size = model.points.iter().map(nalgebra::Vector3::amax).fold(0.0, f64::max);
     // below that the root sat at the origin but for the rounding of its mean
     if origin.amax() > 1e-12 * size {
-        report.approximated.push(format!("moved by {:?} m, so that \"{root}\" is the origin", [-origin.x, -origin.y, -origin.z]));
+        let [x, y, z] = <[f64; 3]>::from(-origin);
+        report.approximated.push(format!("moved by [{x:.6}, {y:.6}, {z:.6}] m, so that \"{root}\" is the origin"));
     }
     if turned > 0 {
         report.approximated.push(format!("{turned} cells counted in the other sense"));

@@ -159,9 +159,12 @@ fn lump(model: &ForeignModel, density: &dyn Fn(usize, usize) -> f64, origin: &st
         let lumped = |mass: &[f64]| -> Matrix3<f64> { mass.iter().zip(&model.points).map(|(m, r)| *m * r * r.transpose()).sum() };
         let target = lumped(&mass) + second;
         let change = match_second_moment(&model.points, &mut mass, &target);
-        origin = format!("{origin}, changed by at most {:.1} % for the exact inertia", 100.0 * change);
+        if change > 0.0 {
+            origin = format!("{origin}, changed by at most {:.1} % for the exact inertia", 100.0 * change);
+        }
         let missing = target - lumped(&mass);
         if missing.norm() > ROUND_OFF * target.norm() {
+            origin = format!("{origin}, with rotary inertia that completes it");
             rotary = Some(missing.trace() * Matrix3::identity() - missing);
         }
     }

@@ -2,8 +2,8 @@
 //!
 //! The symmetric (Loewdin) choice `Phi C^(-1/2)`, `C = Phi^T M Phi`, changes the shapes least of all in the norm of the mass; the modes are
 //! first scaled to modal mass one, so that their arbitrary scale is no part of the change. Source: P.-O. Loewdin, J. Chem. Phys. 18 (1950) 365.
-//! Frequencies are left as the solver gave them. What is left of `C` after scaling measures how far the nodal masses are from the mass
-//! matrix for which the solver's modes were orthogonal: the error of lumping, to first order.
+//! Frequencies are left as the solver gave them. How far `C` is from the identity measures how far the nodal masses are from the mass
+//! matrix for which the solver's modes were orthonormal: the error of lumping, to first order.
 
 use super::error::{ImportError, refused};
 use nalgebra::{DMatrix, SymmetricEigen};
@@ -19,7 +19,7 @@ const NORMALISED: f64 = 0.1;
 pub(super) struct Orthonormal {
     /// New mode j is the sum over k of old mode k times entry (k, j).
     pub transform: DMatrix<f64>,
-    /// Largest departure from orthonormality; of modes in another scale only that from orthogonality.
+    /// Largest relative change of the modal mass of any combination of modes; of modes in another scale without that of the scale.
     pub departure: f64,
     /// True if the modes came scaled to modal mass one.
     pub were_normalised: bool,
@@ -43,7 +43,10 @@ pub(super) fn orthonormalise(file: &Path, modal_mass: &DMatrix<f64>) -> Result<O
     if !(least > DEPENDENT) {
         let pairs = (0..n).flat_map(|j| (0..j).map(move |k| (k, j)));
         let worst = pairs.max_by(|a, b| correlation[*a].abs().total_cmp(&correlation[*b].abs())).unwrap_or((0, 0));
-        let (object, found) = (format!("modes {} and {}", worst.0 + 1, worst.1 + 1), format!("a correlation of {:.6}", correlation[worst]));
+        let (object, found) = (
+            format!("modes {} and {}", worst.0 + 1, worst.1 + 1),
+            format!("shapes that depend on one another or on further modes (correlation {:.6})", correlation[worst]),
+        );
         let remedy = "leave one of them out (modes = [...]), or check the nodal masses";
         return Err(refused(file, object, found, "modes that are independent with these masses", remedy));
     }
@@ -53,9 +56,9 @@ pub(super) fn orthonormalise(file: &Path, modal_mass: &DMatrix<f64>) -> Result<O
     };
     let transform = DMatrix::from_fn(n, n, |k, j| inverse_root[(k, j)] / scale[k]);
     let were_normalised = scale.iter().all(|s| (s * s - 1.0).abs() <= NORMALISED);
-    let coupling = (&correlation - DMatrix::identity(n, n)).amax();
-    let scaling = scale.iter().map(|s| (s * s - 1.0).abs()).fold(0.0, f64::max);
-    let departure = if were_normalised { coupling.max(scaling) } else { coupling };
+    // no combination of modes changes its modal mass by more: the largest departure of an eigenvalue from one
+    let spread = |eigenvalues: &nalgebra::DVector<f64>| eigenvalues.iter().map(|value| (value - 1.0).abs()).fold(0.0, f64::max);
+    let departure = spread(&if were_normalised { modal_mass.clone().symmetric_eigenvalues() } else { eigen.eigenvalues });
     Ok(Orthonormal { transform, departure, were_normalised })
 }
 
@@ -102,7 +105,7 @@ mod tests {
         let mut twice = shapes();
         twice.push(twice[1].iter().map(|v| -3.0 * v).collect());
         let text = orthonormalise(Path::new("a.med"), &modal_mass(&MASS, &twice)).unwrap_err().to_string();
-        assert!(text.contains("a.med: modes 2 and 3: found a correlation of -1.000000, expected modes that are independent"), "{text}");
+        assert!(text.contains("a.med: modes 2 and 3: found shapes that depend on one another or on further modes (correlation -1.000000), expected modes that are independent"), "{text}");
         let text = orthonormalise(Path::new("a.med"), &DMatrix::zeros(1, 1)).unwrap_err().to_string();
         assert!(text.contains("mode 1: found a modal mass of 0.000e0, expected more than zero; leave the mode out"), "{text}");
     }
