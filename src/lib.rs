@@ -12,7 +12,7 @@
 //! - [`model`]: what a system is, checked once and frozen, and its state;
 //! - [`dynamics`]: one evaluation: the sweeps, hinge loads, their audit, the dense twin, energies;
 //! - [`integrate`]: time: charts, steppers, step control, the loop, observers;
-//! - `io`: modal files and results files (feature `hdf5`);
+//! - `io`: modal files, their import from other codes, and results files (feature `hdf5`);
 //! - [`scene`]: scene files to systems and settings;
 //! - [`output`]: observers that keep peaks and limits, write results and stream to the viewer (feature `rerun`);
 //! - [`study`]: error against run time over settings of one scene;
