@@ -61,6 +61,21 @@ macro_rules! xdmf_refused {
 }
 
 xdmf_refused! {
+    two_domains: "mixed.xdmf", "<Domain>", "<Domain/><Domain>", ["Xdmf: found 2 domains, expected one Domain"];
+    no_mesh: "beam.xdmf", "ns0:include", "ns0:exclude", ["Grid: found no Topology and Geometry, expected both, or an include", "with the modes"];
+    a_time_of_another_kind: "beam.xdmf", "<Grid><", "<Time TimeType=\"HyperSlab\"/><Grid><", ["Time: found the time type HyperSlab, expected a list, or a Time in each grid"];
+    two_items: "mixed.xdmf", "</DataItem></Geometry>", "</DataItem><DataItem/></Geometry>", ["Geometry: found 2 data items, expected one"];
+    an_offset: "beam.xdmf", "<Topology ", "<Topology BaseOffset=\"1\" ", ["Topology: found an order or offset of its own, expected nodes counted from 0"];
+    four_extents: "beam.xdmf", "Dimensions=\"20 3\"", "Dimensions=\"20 1 1 3\"", ["Attribute \"displacement\": found 4 extents, expected one to three"];
+    no_path: "beam.xdmf", "beam.h5:/data0", "data0", ["Geometry: found \"data0\", expected FILE.h5:/path/of/dataset"];
+    a_real_node: "mixed.xdmf", "\n9\n0\n", "\n9\n0.5\n", ["Topology: found \"0.5\", expected integers"];
+    reals_as_nodes: "beam.xdmf", "beam.h5:/data1", "beam.h5:/data0", ["Topology: found 60 values, expected 32"];
+    a_stream_cut_short: "mixed.xdmf", "\n6\n10\n13\n11\n12", "\n9\n10\n13\n11\n12", ["Topology: found 4 numbers after the last hexahedron, expected 8", "cut short"];
+    a_long_line: "mixed.xdmf", "\n9\n0\n", "\n2\n8\n", ["Topology: found a polyline of other than two nodes, expected lines of two nodes"];
+    a_field_without_name: "mixed.xdmf", "Name=\"mode_0\"", "", ["Attribute: found no name, expected a Name; name every field"];
+    a_name_twice_in_one_grid: "mixed.xdmf", "Name=\"mode_1\"", "Name=\"mode_0\"", ["Attribute \"mode_0\": found the name twice in one grid"];
+    too_wide_a_field: "mixed.xdmf", "Center=\"Node\"><DataItem DataType=\"Float\" Dimensions=\"14 3\"", "Center=\"Node\"><DataItem DataType=\"Float\" Dimensions=\"14 65\"", ["Attribute \"mode_0\": found 65 components, expected 1 to 64"];
+    a_field_of_other_nodes: "beam.xdmf", "Center=\"Node\"><DataItem DataType=\"Float\" Dimensions=\"20 3\"", "Center=\"Node\"><DataItem DataType=\"Float\" Dimensions=\"30 2\"", ["Attribute \"displacement\": found 3 components, expected 2 as in the steps before"];
     another_root_element: "mixed.xdmf", "<Xdmf Version=\"3.0\">", "<Xdmf Version=\"3.0\"></Xdmf><X>", ["a second root element", "one Xdmf element", "export"];
     two_grids: "mixed.xdmf", "<Domain>", "<Domain><Grid/>", ["Domain: found 2 grids", "one uniform grid, or one temporal collection", "one mesh per file"];
     a_spatial_collection: "beam.xdmf", "CollectionType=\"Temporal\"", "CollectionType=\"Spatial\"", ["a grid of type collection Spatial", "temporal collection", "one step per mode"];
@@ -182,6 +197,9 @@ keys_refused! {
     a_name_with_a_slash: "beam.xdmf", "tip =", "\"a/b\" =", ["interface: found the name \"a/b\", expected a printable name without slash"];
     a_clamp_that_moves: "beam.xdmf", "interface = {", "boundary = \"cantilever\"\nroot = \"tip\"\ninterface = {", ["boundary = \"cantilever\": found a root that moves by 1.0e0 of the largest motion, expected at most 1e-6", "name the clamped nodes"];
     a_free_body_that_is_held: "beam.xdmf", "density", "boundary = \"free-free\"\ndensity", ["boundary = \"free-free\": found ", "of a mode's norm in rigid motion", "how the modes were held"];
+    cells_in_two_groups: "beam.med", "OUTER = 300.0", "body = 1.0, OUTER = 300.0", ["density: found no group of cells \"body\""];
+    a_scale_that_no_body_has: "beam_h5py.med", "density = 250.0", "node_mass = [1.0, 1.0, 1.0, 1.0, -9.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 9.0, 1.0, 1.0, 1.0]", ["beam_h5py.med: the body made of it breaks a rule of modal files: "];
+    an_order_that_is_none: "beam.xdmf", "density", "stress_components = [\"xx\", \"yy\"]\ndensity", ["field \"stress\": found 6 components", "for xx yy", "each once; give their order"];
     another_mesh_name: "beam.med", "damping", "mesh = \"plate\"\ndamping", ["ENS_MAA: found no mesh \"plate\", expected one of \"body\"", "key mesh"];
 }
 
@@ -359,4 +377,40 @@ fn the_command_ends_with_code_2_and_one_message() {
     let mut moved = whole;
     moved[3] = nowhere.to_str().unwrap();
     said(&moved, &["cannot be written", "a folder that exists"]);
+}
+
+#[test]
+fn shapes_of_all_modes_together_are_bounded_by_the_files() {
+    // one array that many steps share: a small file could otherwise ask for any memory
+    let points = 3000;
+    let inline = |width: usize| vec!["0.25"; points * width].join(" ");
+    let step = |i: usize| {
+        format!(
+            "<Grid><Time Value=\"{}\"/><Attribute Name=\"u\"><DataItem Dimensions=\"{points} 3\" Format=\"HDF\">u.h5:/u</DataItem></Attribute></Grid>",
+            i + 2
+        )
+    };
+    let steps: String = (0..450).map(step).collect();
+    let text = format!(
+        "<Xdmf><Domain><Grid GridType=\"Collection\" CollectionType=\"Temporal\"><Grid><Topology TopologyType=\"Tetrahedron\"><DataItem Dimensions=\"1 4\">0 1 2 3</DataItem></Topology><Geometry><DataItem Dimensions=\"{points} 3\">0 0 0 1 0 0 0 1 0 0 0 1 {}</DataItem></Geometry><Time Value=\"1.5\"/><Attribute Name=\"u\"><DataItem Dimensions=\"{points} 3\" Format=\"HDF\">u.h5:/u</DataItem></Attribute></Grid>{steps}</Grid></Domain></Xdmf>",
+        &inline(3)[60..]
+    );
+    let folder = tempfile::tempdir().unwrap();
+    let file = File::create(folder.path().join("u.h5")).unwrap();
+    file.new_dataset::<f64>()
+        .shape((points, 3))
+        .chunk((points, 3))
+        .deflate(9)
+        .create("u")
+        .unwrap()
+        .write_raw(&vec![0.5; 3 * points])
+        .unwrap();
+    file.close().unwrap();
+    std::fs::write(folder.path().join("many.xdmf"), text).unwrap();
+    let keys = "displacement = \"u\"\ndensity = 1.0\ndamping_ratio = 0.0\ninterface.root.nodes = [0, 1, 2]\n";
+    assert_said(
+        &refusal(&folder.path().join("many.xdmf"), keys),
+        "many.xdmf",
+        &["the shapes of all modes: found 32472000 bytes", "damaged"],
+    );
 }

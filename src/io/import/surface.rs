@@ -145,3 +145,32 @@ pub(super) fn triangles(facets: &[Facet]) -> Vec<[usize; 3]> {
     };
     facets.iter().filter(|facet| facet.kind.dimension() == 2).flat_map(fan).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nodes_on_faces_are_sorted_by_place_and_refused_where_that_is_ambiguous() {
+        let mut points: Vec<Vector3<f64>> = CellKind::Hexa27.reference().into_iter().map(Vector3::from).collect();
+        // the order of the MED library: lower, four sides, upper
+        let mut nodes: Vec<usize> = (0..20).chain([24, 22, 21, 23, 20, 25, 26]).collect();
+        let mut block = CellBlock { kind: CellKind::Hexa27, nodes: nodes.clone() };
+        sort_face_nodes(&mut block, &points, std::path::Path::new("a.med")).unwrap();
+        assert_eq!(block.nodes, (0..27).collect::<Vec<_>>());
+        points[21] = points[20] + Vector3::new(0.0, 0.0, 1e-3);
+        points[22] = points[20];
+        nodes.swap(20, 21);
+        let mut block = CellBlock { kind: CellKind::Hexa27, nodes };
+        let text = sort_face_nodes(&mut block, &points, std::path::Path::new("a.med")).unwrap_err().to_string();
+        let words = "a.med: hexahedron27 number 1: found a node that is nearest to two faces, expected one node in the middle of each face";
+        assert!(text.starts_with(words), "{text}");
+    }
+
+    #[test]
+    fn edges_of_quadratic_cells_keep_their_middle() {
+        let facet = Facet { kind: CellKind::Triangle6, nodes: vec![4, 7, 9, 1, 2, 3] };
+        let nodes: Vec<Vec<usize>> = edges(&[facet.clone(), facet]).into_iter().map(|edge| edge.nodes).collect();
+        assert_eq!(nodes, [vec![4, 7, 1], vec![7, 9, 2], vec![9, 4, 3]]);
+    }
+}
