@@ -167,8 +167,10 @@ fn bar(shape: impl Fn(f64) -> f64) -> String {
         "<Xdmf Version=\"3.0\"><Domain><Grid><Geometry GeometryType=\"XYZ\"><DataItem Dimensions=\"20 3\">{points}</DataItem></Geometry>\
          <Topology TopologyType=\"Hexahedron\"><DataItem Dimensions=\"4 8\">{}</DataItem></Topology>\
          <Attribute Name=\"u\" Center=\"Node\"><DataItem Dimensions=\"20 3\">{mode}</DataItem></Attribute>\
+         <Attribute Name=\"s\" Center=\"Cell\"><DataItem Dimensions=\"4 6\">{}</DataItem></Attribute>\
          <Attribute Name=\"mass\" Center=\"Node\"><DataItem Dimensions=\"20\">{mass}</DataItem></Attribute></Grid></Domain></Xdmf>",
-        cells.join(" ")
+        cells.join(" "),
+        (1..=4).flat_map(|cell| (1..=6).map(move |c| (10 * cell * c).to_string())).collect::<Vec<_>>().join(" ")
     )
 }
 
@@ -180,6 +182,34 @@ fn import_bar(shape: impl Fn(f64) -> f64, more: &str) -> (tempfile::TempDir, Imp
     let file = folder.path().join("bar.xdmf");
     std::fs::write(&file, bar(shape)).unwrap();
     import_file(&file, &format!("{BAR}{more}"))
+}
+
+#[test]
+fn stress_of_cells_stays_with_its_cells() {
+    let (_folder, _, file, body) =
+        import_bar(|x| x + 1.0, "density = 100.0\nstress = \"s\"\ninterface.tip.box = [[1.0, -0.1, -0.1], [1.0, 0.1, 0.1]]\n");
+    // the tip moves by 2 in the mode of the file
+    let scale = body.interface("tip").unwrap().mode_shape[0][5] / 2.0;
+    let surface = file.read_surface(&[0]).unwrap();
+    let stress = surface.stress.unwrap();
+    assert_eq!(stress.place, pliant::model::surface::StressPlace::Triangle);
+    for (triangle, tensor) in surface.triangles.iter().zip(&stress.values[0]) {
+        let middle = triangle.iter().map(|&node| surface.points[node as usize][0]).sum::<f64>() / 3.0;
+        let cell = 1.0 + (middle / 0.5).floor().clamp(0.0, 3.0);
+        assert!((f64::from(tensor[1]) / (20.0 * cell * scale) - 1.0).abs() < 2.0 * f64::from(f32::EPSILON), "{middle} {tensor:?}");
+    }
+}
+
+#[test]
+fn times_may_be_listed_once_for_all_steps() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = std::fs::read_to_string(data("beam.xdmf")).unwrap();
+    let text = text.replace("<Time Value=\"2.5\" />", "").replace("<Time Value=\"10.0\" />", "");
+    let list = "CollectionType=\"Temporal\"><Time TimeType=\"List\"><DataItem Dimensions=\"2\">7 8</DataItem></Time>";
+    std::fs::write(folder.path().join("beam.xdmf"), text.replace("CollectionType=\"Temporal\">", list)).unwrap();
+    std::fs::copy(data("beam.h5"), folder.path().join("beam.h5")).unwrap();
+    let (_folder, _, _, body) = import_file(&folder.path().join("beam.xdmf"), &keys("beam.xdmf"));
+    assert_eq!(body.frequency_hz, [7.0, 8.0]);
 }
 
 #[test]

@@ -373,6 +373,14 @@ fn the_command_ends_with_code_2_and_one_message() {
         &["import", "beam.xdmf", "--out", out, "--boundary", "glued"],
         &["boundary: \"glued\" must be cantilever, free-free, craig-bampton or general"],
     );
+    for name in ["beam.xdmf", "beam.h5"] {
+        std::fs::copy(data(name), folder.path().join(name)).unwrap();
+    }
+    let (copy, numbers) = (folder.path().join("beam.xdmf"), folder.path().join("beam.h5"));
+    let mut over = whole;
+    (over[1], over[3]) = (copy.to_str().unwrap(), numbers.to_str().unwrap());
+    said(&over, &["beam.h5: cannot be written: it is a file that is imported"]);
+    assert_eq!(std::fs::read(&numbers).unwrap(), std::fs::read(data("beam.h5")).unwrap());
     let nowhere = folder.path().join("no/b.h5");
     let mut moved = whole;
     moved[3] = nowhere.to_str().unwrap();

@@ -88,6 +88,11 @@ refused! {
     a_geometric_matrix_of_no_interface_is_refused: COMPLETE, |f| f.relink("geometric/tip", "geometric/nose").unwrap(), ["geometric/nose", "name of an interface"];
     a_modal_mass_that_is_not_one_is_refused: COMPLETE, |f| numbers(f, "inertia/modal_mass", |v| v[0] = 1.5), ["inertia/modal_mass", "5.000e-1", "1e-6", "orthonormalise"];
 
+    a_departure_that_is_no_number_is_refused: CANTILEVER, |f| {
+        let group = f.group("inertia").unwrap();
+        text(&group, "source", "lumped");
+        text(&group, "departure", "soon");
+    }, ["inertia@departure", "\"soon\"", "a number of zero or more", "import the body again"];
     a_missing_dataset_is_refused: CANTILEVER, |f| f.unlink("body/mass").unwrap(), ["body/mass", "found nothing", "a dataset"];
     a_missing_group_is_refused: CANTILEVER, |f| f.unlink("interfaces/mid").and(f.unlink("modes")).unwrap(), ["modes/displacement", "found nothing", "one dataset per mode"];
     a_missing_attribute_is_refused: CANTILEVER, |f| f.delete_attr("mode_count").unwrap(), ["@mode_count", "found nothing", "an integer"];

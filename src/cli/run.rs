@@ -157,7 +157,7 @@ fn check_targets(arguments: &RunArguments, scene: &Scene) -> Result<(), Failure>
     let real = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_owned());
     let inputs = std::iter::once(real(&scene.source.path));
     #[cfg(feature = "hdf5")]
-    let inputs = inputs.chain(scene.flexible.iter().map(|(_, selection)| real(selection.file.path())));
+    let inputs = inputs.chain(scene.flexible.iter().flat_map(|(_, selection)| selection.file.inputs().iter().map(|input| real(input))));
     let inputs: Vec<_> = inputs.collect();
     for (option, target) in [("--out", &arguments.out), ("--rrd", &arguments.rrd)] {
         if let Some(target) = target.as_ref().filter(|t| inputs.contains(&real(t))) {

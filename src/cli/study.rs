@@ -120,7 +120,7 @@ fn check_targets(arguments: &StudyArguments, grid: &Grid) -> Result<(), Failure>
     let mut taken: Vec<PathBuf> = vec![real(&grid.base.source.path)];
     taken.extend(arguments.reference.as_deref().map(real));
     #[cfg(feature = "hdf5")]
-    taken.extend(grid.base.flexible.iter().map(|(_, selection)| real(selection.file.path())));
+    taken.extend(grid.base.flexible.iter().flat_map(|(_, selection)| selection.file.inputs().iter().map(|input| real(input))));
     for (option, target) in [("--state", &arguments.state), ("--csv", &arguments.csv), ("--svg", &arguments.svg)] {
         let Some(target) = target else { continue };
         let path = real(target);

@@ -10,7 +10,7 @@ use super::header::{Header, read_header};
 use super::modal_check::examine;
 use crate::model::modal_body::{Interface, ModalBody};
 use nalgebra::{DMatrix, Matrix3, Vector3, Vector6};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// The 12 unit inertial loads in the order of [`ModalBody::geometric_stiffness`].
 pub const GEOMETRIC_LOADS: [&str; 12] =
@@ -82,6 +82,7 @@ pub struct InterfaceSupport {
 pub struct ModalFile {
     pub(super) file: GuardedFile,
     header: Header,
+    inputs: Vec<PathBuf>,
     /// Takes the file away with this value, where it was made for it alone; after `file`, so that it is closed first.
     _scratch: Option<tempfile::TempPath>,
 }
@@ -94,13 +95,19 @@ impl ModalFile {
     pub fn open(path: &Path) -> Result<Self, ModalFileError> {
         let file = GuardedFile::open(path)?;
         let header = read_header(&file)?;
-        Ok(Self { file, header, _scratch: None })
+        Ok(Self { file, header, inputs: vec![path.to_owned()], _scratch: None })
     }
 
     /// The same file, known as `shown`; what is at `scratch`, where it was made for this value alone, goes away with it.
-    pub(super) fn made_from(mut self, shown: &Path, scratch: tempfile::TempPath) -> Self {
+    pub(super) fn made_from(mut self, shown: &Path, inputs: Vec<PathBuf>, scratch: tempfile::TempPath) -> Self {
         self.file.show_as(shown);
-        Self { _scratch: Some(scratch), ..self }
+        Self { inputs, _scratch: Some(scratch), ..self }
+    }
+
+    /// Every file behind this one: itself, or those it was imported from.
+    #[must_use]
+    pub fn inputs(&self) -> &[PathBuf] {
+        &self.inputs
     }
 
     /// Opens a file, reads all of it and holds it against every rule of the schema.

@@ -73,10 +73,10 @@ def test_the_panel_of_the_default_example_gives_the_same_hinge_loads(writer, pan
     name, write, displacement, stress = WRITERS[writer]
     write(tmp_path / name, panel)
     fields = ["--displacement", displacement] + (["--stress", stress] if stress else [])
-    report = _import(tmp_path / name, tmp_path / "panel.h5", *fields, "--density", 250,
+    report = _import(tmp_path / name, tmp_path / "body.h5", *fields, "--density", 250,
                      "--interface", "root=root", "--interface", "outboard=outboard")
     assert 1e-5 < report["departure"] < 1e-3
-    imported = loads(re.sub(r"\W", "_", writer), f"modal_file = {json.dumps(str(tmp_path / 'panel.h5'))}")
+    imported = loads(re.sub(r"\W", "_", writer), f"modal_file = {json.dumps(str(tmp_path / 'body.h5'))}")
     for load, values in reference.items():
         # measured: 9e-6, and 7e-8 about the drive axis
         assert np.abs(imported[load] - values).max() <= report["departure"] * np.abs(values).max(), load
@@ -84,10 +84,10 @@ def test_the_panel_of_the_default_example_gives_the_same_hinge_loads(writer, pan
 
 def test_a_scene_that_names_the_file_gives_the_same_loads_as_its_modal_file(panel, loads, tmp_path):
     import_samples.write_med(tmp_path / "panel.med", panel)
-    _import(tmp_path / "panel.med", tmp_path / "panel.h5", "--displacement", "MODES___DEPL", "--density", 250, "--interface", "root=root")
+    _import(tmp_path / "panel.med", tmp_path / "body.h5", "--displacement", "MODES___DEPL", "--density", 250, "--interface", "root=root")
     keys = 'displacement = "MODES___DEPL", density = 250.0, damping_ratio = 0.005, interface = { root = { group = "root" } }'
     direct = loads("direct", f"import = {{ file = {json.dumps(str(tmp_path / 'panel.med'))}, {keys} }}")
-    through = loads("through", f"modal_file = {json.dumps(str(tmp_path / 'panel.h5'))}")
+    through = loads("through", f"modal_file = {json.dumps(str(tmp_path / 'body.h5'))}")
     assert all(np.array_equal(direct[load], through[load]) for load in direct)
 
 
@@ -170,8 +170,8 @@ def test_quadratic_cells_of_meshio_keep_mass_and_inertia_to_rounding(cell_type, 
     exact = 10 * np.diag([0.05 / 12, 4 / 3 + 0.01 / 12, 4 / 3 + 0.04 / 12])
     for write, name, field in ((import_samples.write_xdmf, "b.xdmf", "displacement"), (import_samples.write_med, "b.med", "MODES___DEPL")):
         write(tmp_path / name, body)
-        _import(tmp_path / name, tmp_path / "b.h5", "--displacement", field, "--density", 250, "--interface", "root=box:0,0,0,0,1,1")
-        with h5py.File(tmp_path / "b.h5") as file:
+        _import(tmp_path / name, tmp_path / "body.h5", "--displacement", field, "--density", 250, "--interface", "root=box:0,0,0,0,1,1")
+        with h5py.File(tmp_path / "body.h5") as file:
             assert file["mesh/node_mass"].attrs["kind"] == b"row_sum_signed" and "mesh/node_inertia" not in file
             # about the middle of the root face, which became the origin
             assert np.abs(file["body/inertia"][()] - exact).max() < 1e-11

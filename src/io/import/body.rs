@@ -17,6 +17,8 @@ use std::path::{Path, PathBuf};
 pub struct ImportReport {
     /// The imported file.
     pub file: PathBuf,
+    /// Every file that was read.
+    pub inputs: Vec<PathBuf>,
     /// "XDMF" or "MED".
     pub format: &'static str,
     /// Nodes and modes.
@@ -57,6 +59,11 @@ pub fn import_to(file: &Path, options: &ImportOptions, out: &Path) -> Result<Imp
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
     let partial = builder.tempfile_in(folder).map_err(|e| fail(e.to_string()))?.into_temp_path();
     let report = write(file, options, &partial)?;
+    let real = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    // a series NAME.xdmf has its numbers in NAME.h5
+    if report.inputs.iter().any(|input| real(input) == real(out)) {
+        return Err(fail("it is a file that is imported".to_owned()));
+    }
     accept(file, &partial)?;
     partial.persist(out).map_err(|e| fail(e.error.to_string()))?;
     Ok(ImportedBody { report, examination: examine(out) })
@@ -69,9 +76,9 @@ pub fn import_to(file: &Path, options: &ImportOptions, out: &Path) -> Result<Imp
 pub fn import(file: &Path, options: &ImportOptions) -> Result<(ModalFile, crate::model::modal_body::ModalBody), ImportError> {
     let fail = |cause: String| ImportError::Output { file: std::env::temp_dir(), cause };
     let scratch = tempfile::Builder::new().prefix("pliant").suffix(".h5").tempfile().map_err(|e| fail(e.to_string()))?.into_temp_path();
-    write(file, options, &scratch)?;
+    let report = write(file, options, &scratch)?;
     let (modal_file, body) = accept(file, &scratch)?;
-    Ok((modal_file.made_from(file, scratch), body))
+    Ok((modal_file.made_from(file, report.inputs, scratch), body))
 }
 
 /// The written file, if it breaks no rule.
@@ -114,6 +121,7 @@ fn write(file: &Path, options: &ImportOptions, out: &Path) -> Result<ImportRepor
     let modes = modes::read(&model, options)?;
     let mut report = ImportReport {
         file: file.to_owned(),
+        inputs: model.source.files(),
         format: model.format,
         sizes: (model.points.len(), modes.frequency_hz.len()),
         mass: nodal.mass.iter().sum(),

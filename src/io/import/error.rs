@@ -48,7 +48,7 @@ pub enum ImportError {
     #[error(transparent)]
     Hdf5(ModalFileError),
     /// The modal file cannot be written.
-    #[error("{}: cannot be written: {cause}; name a file in a folder that exists and may be written", file.display())]
+    #[error("{}: cannot be written: {cause}; name another file, in a folder that exists and may be written", file.display())]
     Output {
         /// The modal file.
         file: PathBuf,

@@ -63,6 +63,10 @@ impl FieldSource for Steps {
     fn budget(&self) -> &Budget {
         &self.reader.budget
     }
+
+    fn files(&self) -> Vec<PathBuf> {
+        vec![self.reader.path.clone()]
+    }
 }
 
 /// From component after component to row after row.

@@ -66,6 +66,9 @@ pub(super) trait FieldSource: std::fmt::Debug {
 
     /// The bound on what the file may make the importer hold.
     fn budget(&self) -> &Budget;
+
+    /// Files that were read so far.
+    fn files(&self) -> Vec<PathBuf>;
 }
 
 /// A file of another code, understood but for the numbers of its fields.

@@ -11,7 +11,7 @@ use super::xdmf_item::{Folder, Item};
 use super::xml::{self, Document, Element};
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Reads an XDMF file.
 ///
@@ -54,6 +54,10 @@ impl FieldSource for Items {
 
     fn budget(&self) -> &Budget {
         &self.folder.budget
+    }
+
+    fn files(&self) -> Vec<PathBuf> {
+        self.folder.files()
     }
 }
 

@@ -56,6 +56,11 @@ impl Folder {
         &self.xdmf
     }
 
+    /// The XDMF file and the HDF5 files opened so far.
+    pub fn files(&self) -> Vec<PathBuf> {
+        self.open.borrow().values().map(|file| file.path().to_owned()).chain([self.xdmf.clone()]).collect()
+    }
+
     /// Understands a DataItem; `object` says whose it is.
     pub fn item(&self, element: &Element, object: &str) -> Result<Item, ImportError> {
         let fault = |found: String, expected: &str, remedy: &str| Err(refused(&self.xdmf, object, found, expected, remedy));
