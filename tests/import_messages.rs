@@ -67,6 +67,7 @@ xdmf_refused! {
     two_items: "mixed.xdmf", "</DataItem></Geometry>", "</DataItem><DataItem/></Geometry>", ["Geometry: found 2 data items, expected one"];
     an_offset: "beam.xdmf", "<Topology ", "<Topology BaseOffset=\"1\" ", ["Topology: found an order or offset of its own, expected nodes counted from 0"];
     four_extents: "beam.xdmf", "Dimensions=\"20 3\"", "Dimensions=\"20 1 1 3\"", ["Attribute \"displacement\": found 4 extents, expected one to three"];
+    control_characters_in_a_path: "beam.xdmf", "beam.h5:/data0", "be\u{7}am.h5:/data0", ["Geometry: found \"be\u{fffd}am.h5:/data0\", expected FILE.h5:/path/of/dataset"];
     no_path: "beam.xdmf", "beam.h5:/data0", "data0", ["Geometry: found \"data0\", expected FILE.h5:/path/of/dataset"];
     a_real_node: "mixed.xdmf", "\n9\n0\n", "\n9\n0.5\n", ["Topology: found \"0.5\", expected integers"];
     reals_as_nodes: "beam.xdmf", "beam.h5:/data1", "beam.h5:/data0", ["Topology: found 60 values, expected 32"];

@@ -12,6 +12,9 @@ use std::rc::Rc;
 /// Most HDF5 files behind one XDMF file.
 const FILE_LIMIT: usize = 64;
 
+/// Longest path of a dataset with its file (bytes).
+const REFERENCE_LIMIT: usize = 1024;
+
 /// Where the numbers are.
 #[derive(Debug, Clone, PartialEq)]
 enum Content {
@@ -95,7 +98,9 @@ impl Folder {
             "xml" => Content::Inline(element.text.clone()),
             "hdf" | "hdf5" => {
                 let reference = element.text.trim();
-                let Some((file, path)) = reference.split_once(":/") else {
+                // names reach the terminal in messages, where control characters are commands
+                let fits = reference.len() <= REFERENCE_LIMIT && !reference.contains(char::is_control);
+                let Some((file, path)) = reference.split_once(":/").filter(|_| fits) else {
                     return fault(format!("\"{}\"", printable(reference)), "FILE.h5:/path/of/dataset", "export the file again");
                 };
                 Content::Hdf { file: file.to_owned(), path: path.trim_matches('/').to_owned() }
