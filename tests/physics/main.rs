@@ -16,6 +16,7 @@ mod nodal_sums;
 mod published;
 mod published_flexible;
 mod published_loops;
+mod reference_solver;
 mod rotating;
 mod scaling;
 mod stiff;
