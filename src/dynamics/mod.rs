@@ -54,7 +54,7 @@ pub mod profile;
 pub mod sweep;
 pub mod world;
 
-use crate::model::{ClosureMethod, State, System};
+use crate::model::{Body, ClosureMethod, State, System, hinge};
 use closed_chain::ClosedChain;
 use nalgebra::Vector6;
 use sweep::acceleration_outward::AccelerationScratch;
@@ -107,13 +107,43 @@ pub enum DynamicsError {
         /// Pivot of `D` found.
         inertia: f64,
     },
+    /// Axes of a hinge that lie in one plane (of a gimbal) or line (of a universal hinge).
+    #[error(
+        "hinge \"{hinge}\" between \"{parent}\" and \"{child}\" is in gimbal lock: its axes are within {spread:.1e} of dependent; \
+         use kind = \"spherical\", or order the axes so that the motion stays away from lock"
+    )]
+    GimbalLock {
+        /// Name of the hinge.
+        hinge: String,
+        /// Name of the parent body, or "world".
+        parent: String,
+        /// Name of the child body.
+        child: String,
+        /// Volume or area that the axes span.
+        spread: f64,
+    },
+    /// Accelerations beyond what numbers hold.
+    #[error("{place} leaves finite numbers; look for positions, rates, loads or masses that are far too large or too small")]
+    NotFinite {
+        /// Hinge or mode, as messages name it.
+        place: String,
+    },
     /// Modes that carry more mass than the body has, seen from its inboard hinge.
     #[error(
-        "body \"{body}\": its modes, held at the inboard hinge, have no positive definite mass; check the modal file with `pliant check`"
+        "body \"{body}\": {}",
+        if *empty {
+            "beside what its modes carry it has no inertia along some direction of its frame, which a hinge that the modes move needs; \
+             give it inertia there, retain fewer modes, or use modes that hold the root"
+        } else {
+            "its modes, held at the inboard hinge, have no positive definite mass; check the modal file with `pliant check`, \
+             or look for deflections beyond what it can hold"
+        }
     )]
     SingularModes {
         /// Name of the body.
         body: String,
+        /// True if nothing is negative: a direction is empty.
+        empty: bool,
     },
     /// Closures that no multipliers can satisfy together.
     #[error(
@@ -168,12 +198,19 @@ pub enum DynamicsError {
 
 impl DynamicsError {
     /// What an inertia that is not positive along rate `rate` of the hinge of body `k` means.
-    fn of_hinge(system: &System, k: usize, rate: usize, inertia: f64, scale: f64) -> Self {
+    fn of_hinge(system: &System, pose: &PoseScratch, k: usize, (rate, inertia, scale): (usize, f64, f64)) -> Self {
         let body = &system.bodies[k];
+        if !(inertia.is_finite() && scale.is_finite()) {
+            return Self::NotFinite { place: format!("the inertia along rate {} of hinge \"{}\"", rate + 1, body.hinge.name) };
+        }
         let (hinge, child, rate) = (body.hinge.name.clone(), body.name.clone(), rate + 1);
         let parent = body.parent.map_or_else(|| "world".to_owned(), |p| system.bodies[p].name.clone());
+        let spread = body.hinge.kind.axis_spread(&pose.bodies[k].hinge.map);
+        if spread < hinge::LOCKED {
+            return Self::GimbalLock { hinge, parent, child, spread };
+        }
         let stiffens = system.bodies.iter().any(|b| b.flexible().is_some_and(crate::model::FlexibleBody::stiffens));
-        if stiffens && inertia.is_finite() && is_negative(inertia, scale) {
+        if stiffens && is_negative(inertia, scale) {
             return Self::OverDeformed { hinge, parent, child, rate, inertia };
         }
         let looped = system.closures.iter().any(|c| c.method == ClosureMethod::TreeAugmented);
@@ -187,8 +224,12 @@ impl DynamicsError {
         match self {
             Self::SingularHinge { inertia, scale, .. } | Self::SingularAggregate { inertia, scale, .. } => is_negative(*inertia, *scale),
             Self::Unclosed { residual, .. } => !residual.is_finite(),
-            Self::SingularModes { .. } | Self::OverDeformed { .. } | Self::ContradictoryClosures { .. } | Self::ChangePoint { .. } => false,
-            Self::BrokenClosures { .. } => true,
+            Self::SingularModes { .. }
+            | Self::OverDeformed { .. }
+            | Self::ContradictoryClosures { .. }
+            | Self::ChangePoint { .. }
+            | Self::GimbalLock { .. } => false,
+            Self::BrokenClosures { .. } | Self::NotFinite { .. } => true,
         }
     }
 }
@@ -293,5 +334,22 @@ pub fn forward_dynamics(system: &System, state: &State, workspace: &mut Workspac
         chain.check_closed(system, pose, velocity, acceleration)?;
         chain.recover_embedded(&aggregate::load::Swept { system, state, pose, velocity, inertia, acceleration }, force);
     }
-    Ok(())
+    check_finite(system, acceleration)
+}
+
+/// Refuses accelerations that are no numbers: products of finite numbers may overflow.
+fn check_finite(system: &System, acceleration: &AccelerationScratch) -> Result<(), DynamicsError> {
+    let all = |x: &[f64]| x.iter().fold(true, |finite, x| finite & x.is_finite());
+    if all(&acceleration.hinge) && all(&acceleration.modal) {
+        return Ok(());
+    }
+    let first = |body: &&Body| !(all(&acceleration.hinge[body.velocity_range()]) && all(&acceleration.modal[body.modal_range()]));
+    let place = system.bodies.iter().find(first).map_or_else(String::new, |body| {
+        if all(&acceleration.hinge[body.velocity_range()]) {
+            format!("the acceleration of the modes of body \"{}\"", body.name)
+        } else {
+            format!("the acceleration of hinge \"{}\"", body.hinge.name)
+        }
+    });
+    Err(DynamicsError::NotFinite { place })
 }

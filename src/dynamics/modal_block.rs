@@ -28,7 +28,10 @@ pub struct ModalBlock {
 
 /// An inertia that should be positive definite has no inverse.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct SingularBlock;
+pub struct SingularBlock {
+    /// True if it is semidefinite: some direction is empty.
+    pub empty: bool,
+}
 
 /// `sum_j a_j b_j'` over the modes: `A' B` of two n x 6 matrices.
 #[must_use]
@@ -65,13 +68,13 @@ impl ModalBlock {
     pub fn add_child(&mut self, fill: impl FnOnce(&mut [Vector6<f64>]), S: &SpatialInertia) -> Result<(), SingularBlock> {
         let index = self.used;
         let (done, open) = self.updates.split_at_mut(index);
-        let update = open.first_mut().ok_or(SingularBlock)?;
+        let update = open.first_mut().ok_or(SingularBlock { empty: false })?;
         fill(&mut update.Y);
         update.F.copy_from_slice(&update.Y);
         solve_rows(&self.inverse_diagonal, done, &mut update.F);
         let S = S.matrix();
         let inner = Matrix6::identity() + S * outer_sum(&update.Y, &update.F);
-        let N = inner.lu().solve(&S).ok_or(SingularBlock)?;
+        let N = inner.lu().solve(&S).ok_or(SingularBlock { empty: false })?;
         update.N = (N + N.transpose()) * 0.5;
         self.used = index + 1;
         Ok(())

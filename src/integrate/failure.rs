@@ -14,6 +14,21 @@ pub enum RunFailure {
         /// What went wrong.
         source: DynamicsError,
     },
+    /// A gimbal or universal hinge whose axes became dependent.
+    #[error(
+        "at t = {time} s hinge \"{hinge}\", which carries \"{child}\", ran into gimbal lock: its axes are within {spread:.1e} of dependent; \
+         use kind = \"spherical\", or order the axes so that the motion stays away from lock"
+    )]
+    GimbalLock {
+        /// s.
+        time: f64,
+        /// Name of the hinge.
+        hinge: String,
+        /// Name of the body that it carries.
+        child: String,
+        /// Volume or area that the axes span.
+        spread: f64,
+    },
     /// Numbers that left the finite range.
     #[error("at t = {time} s the motion left finite numbers, fastest in {place}; {remedy}")]
     NotFinite {

@@ -12,8 +12,9 @@ use super::tableau::Tableau;
 use super::w_tableau::ROS34PW2;
 use super::{Stepper, tableau};
 use crate::dynamics::closed_chain::drift;
-use crate::dynamics::{Workspace, forward_dynamics};
-use crate::model::{ClosureMethod, State, System};
+use crate::dynamics::{DynamicsError, Workspace, forward_dynamics};
+use crate::model::hinge::HingePose;
+use crate::model::{Body, ClosureMethod, HingeKind, State, System};
 
 /// A method with its step or tolerance.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -127,7 +128,12 @@ pub fn simulate(system: &System, start: &State, settings: &Settings, observers: 
         evaluations: 0,
         local_error: 0.0,
     };
-    let outcome = run.go(stepper.as_mut(), observers);
+    let mut outcome = run.go(stepper.as_mut(), observers);
+    if let Outcome::Failed(failure) = &mut outcome
+        && let Some(locked) = gimbal_lock(run.chart)
+    {
+        *failure = locked;
+    }
     let Run { steps, rejected, evaluations, local_error, .. } = run;
     Summary {
         outcome,
@@ -369,6 +375,9 @@ impl Run<'_, '_> {
                         let cut = self.has_cut();
                         return Err(if passage.is_near() {
                             RunFailure::ChangePoint { time, cut, source: Some(source) }
+                        } else if matches!(source, DynamicsError::NotFinite { .. }) {
+                            let place = fastest_place(self.chart);
+                            RunFailure::NotFinite { time, place, remedy: "look at the loads and springs that act there" }
                         } else {
                             RunFailure::Dynamics { time, source }
                         });
@@ -405,9 +414,11 @@ impl Run<'_, '_> {
                 drift::project(self.chart.system, &mut self.sampled, &mut self.output)
                     .map_err(|source| RunFailure::Dynamics { time: at, source })?;
             }
-            forward_dynamics(self.chart.system, &self.sampled, &mut self.output)
-                .map_err(|source| RunFailure::Dynamics { time: at, source })?;
-            if !is_finite(&self.output) {
+            let evaluated = forward_dynamics(self.chart.system, &self.sampled, &mut self.output);
+            let finite = !matches!(evaluated, Err(DynamicsError::NotFinite { .. })) && is_finite(&self.output);
+            if finite {
+                evaluated.map_err(|source| RunFailure::Dynamics { time: at, source })?;
+            } else {
                 let place = fastest_place(self.chart);
                 return Err(RunFailure::NotFinite {
                     time: at,
@@ -456,6 +467,24 @@ fn is_finite(workspace: &Workspace) -> bool {
     let acceleration = &workspace.acceleration;
     let numbers = acceleration.hinge.iter().chain(&acceleration.modal);
     numbers.chain(acceleration.alpha_plus.iter().flatten()).all(|x| x.is_finite())
+}
+
+/// Spread of axes below which rates of a gimbal, which grow with its inverse, are what ended a run.
+const NEAR_LOCK: f64 = 1e-2;
+
+/// The hinge whose axes were about to become dependent when a run ended.
+fn gimbal_lock(chart: &Chart<'_>) -> Option<RunFailure> {
+    let mut pose = HingePose::default();
+    let mut spread_of = |body: &Body| {
+        if body.hinge.is_prescribed() || !matches!(body.hinge.kind, HingeKind::Universal { .. } | HingeKind::Gimbal { .. }) {
+            return 1.0;
+        }
+        body.hinge.kind.pose(&chart.base.position[body.position_range()], &mut pose);
+        body.hinge.kind.axis_spread(&pose.map)
+    };
+    let spreads = chart.system.bodies.iter().map(|b| (spread_of(b), b));
+    let (spread, body) = spreads.min_by(|a, b| a.0.total_cmp(&b.0)).filter(|(spread, _)| *spread < NEAR_LOCK)?;
+    Some(RunFailure::GimbalLock { time: chart.base.time, hinge: body.hinge.name.clone(), child: body.name.clone(), spread })
 }
 
 /// The hinge or mode that moves fastest, for messages.

@@ -76,6 +76,7 @@ impl Definition {
             rows = closure.rows().end;
             system.closures.push(closure);
         }
+        super::inertia_check::check(self, &system, &state)?;
         super::aggregate::choose_methods(&mut system);
         (system.aggregates, system.roles) = super::aggregate::aggregates(&system);
         state.apply_prescribed(&system);

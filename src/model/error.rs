@@ -78,6 +78,23 @@ pub enum ModelError {
         /// Its interfaces.
         known: String,
     },
+    /// A hinge at the end of a branch that moves nothing.
+    #[error(
+        "hinge \"{hinge}\" between \"{parent}\" and \"{child}\": nothing outboard has inertia along its rate {rate}; \
+         give \"{child}\" mass or inertia there, or fix or prescribe the hinge"
+    )]
+    NoInertia {
+        /// Where.
+        place: Place,
+        /// Name of the hinge.
+        hinge: String,
+        /// Name of the parent body, or "world".
+        parent: String,
+        /// Name of the child body.
+        child: String,
+        /// 1-based number of the rate.
+        rate: usize,
+    },
     /// A body that no hinge carries.
     #[error("body \"{body}\" is not the child of any hinge; join it to its parent or to \"world\" with a [[hinge]]")]
     Unconnected {
@@ -243,6 +260,7 @@ impl ModelError {
             | Self::Excluded { place, .. }
             | Self::MomentOnNode { place, .. }
             | Self::ClosureOnOneBody { place, .. }
+            | Self::NoInertia { place, .. }
             | Self::Table { place, .. } => Some(place),
         }
     }

@@ -11,6 +11,9 @@ use nalgebra::{Matrix3, Vector3, Vector6};
 /// Most rates a hinge can have.
 pub const MAX_RATES: usize = 6;
 
+/// Spread of the axes (see [`HingeKind::axis_spread`]) below which a hinge is in gimbal lock: with half of the digits gone.
+pub const LOCKED: f64 = 1e-6;
+
 /// Kind of a hinge with its geometry. Axes are of unit length, in O+ axes.
 #[derive(Debug, Clone, PartialEq)]
 pub enum HingeKind {
@@ -196,6 +199,17 @@ impl HingeKind {
                     map[i + 3] = travel(&Vector3::ith(i, 1.0));
                 }
             }
+        }
+    }
+
+    /// Volume that the axes of a gimbal hinge span, or area of a universal one: zero in gimbal lock. One for the other kinds.
+    #[must_use]
+    pub fn axis_spread(&self, map: &[Vector6<f64>; MAX_RATES]) -> f64 {
+        let axis = |i: usize| Vector3::new(map[i][0], map[i][1], map[i][2]);
+        match self {
+            Self::Universal { .. } => axis(0).cross(&axis(1)).norm(),
+            Self::Gimbal { .. } => axis(0).dot(&axis(1).cross(&axis(2))).abs(),
+            _ => 1.0,
         }
     }
 

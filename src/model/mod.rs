@@ -10,6 +10,7 @@ pub mod definition;
 pub mod error;
 pub mod flexible_body;
 pub mod hinge;
+mod inertia_check;
 pub mod left_out;
 pub mod load;
 pub mod modal_body;

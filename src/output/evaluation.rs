@@ -197,11 +197,12 @@ impl Evaluation {
     /// Evaluates the dynamics at `state`, whose prescribed hinges must stand at their functions' values, and records the result.
     ///
     /// # Errors
-    /// [`DynamicsError`] if the evaluation has no answer.
+    /// [`DynamicsError`] if the evaluation has no answer, or not a finite one.
     pub fn of(system: &System, state: &State) -> Result<Self, DynamicsError> {
         let mut workspace = Workspace::new(system);
         forward_dynamics(system, state, &mut workspace)?;
-        Ok(Self::at(system, state, &workspace))
+        let evaluation = Self::at(system, state, &workspace);
+        if evaluation.is_finite() { Ok(evaluation) } else { Err(DynamicsError::NotFinite { place: "a load or an energy".into() }) }
     }
 }
 

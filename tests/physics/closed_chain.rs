@@ -1,6 +1,8 @@
-//! Closed chains: against a dense solve, the audit, published linkages, and any choice of the cut.
+//! Closed chains: against a dense solve, the audit, published linkages, and any choice of the cut. Loops that lose rank are in the
+//! stability suite.
 
 use crate::support::assert_close;
+use crate::support::linkages::{COUPLER, CRANK, ROCKER, closure, four_bar, rod, row_of_four_bars};
 use crate::support::loops::{METHODS, add_gears, held_by, random_loops};
 use crate::support::scenes::{G, Z, dormand_prince, hinge, rigid, rk4, run};
 use crate::support::trees::Recipe;
@@ -12,7 +14,7 @@ use pliant::dynamics::inverse::NewtonEuler;
 use pliant::dynamics::world::{WorldFrame, hinge_frame, world_frames};
 use pliant::dynamics::{DynamicsError, Workspace, dense, forward_dynamics};
 use pliant::integrate::{Outcome, Settings, simulate};
-use pliant::model::build::{BodyDefinition, BodyDefinitionKind, Definition, Frame, HingeDefinition, WORLD};
+use pliant::model::build::{Definition, WORLD};
 use pliant::model::build_closure::ClosureDefinition;
 use pliant::model::modal_body::Boundary;
 use pliant::model::{ClosureJoint, State, System, TimeFunction};
@@ -25,21 +27,6 @@ pub fn evaluated(system: &System, state: &State) -> Workspace {
 
 fn accelerations(workspace: &Workspace) -> Vec<f64> {
     workspace.acceleration.hinge.iter().chain(&workspace.acceleration.modal).copied().collect()
-}
-
-/// A closure at the points `at_a`, `at_b`.
-pub fn closure(name: &str, kind: &str, axes: &[[f64; 3]], a: &str, at_a: [f64; 3], b: &str, at_b: [f64; 3]) -> ClosureDefinition {
-    let frame = |x: [f64; 3]| Frame { position: Vector3::from(x), ..Frame::default() };
-    ClosureDefinition {
-        name: name.into(),
-        kind: kind.into(),
-        axes: axes.iter().map(|a| Vector3::from(*a)).collect(),
-        a: a.into(),
-        frame_a: frame(at_a),
-        b: b.into(),
-        frame_b: frame(at_b),
-        ..ClosureDefinition::default()
-    }
 }
 
 /// All methods, and every mix of them, against one dense solve: accelerations, multipliers, and the audit of all hinge loads.
@@ -135,58 +122,6 @@ fn every_method_agrees_with_the_dense_kkt_solve_and_passes_the_audit() {
     assert!(compared >= 240 && close >= 180, "{compared} compared, {close} to 1e-10, {refused:?} refused");
 }
 
-/// Uniform rod along x.
-pub fn rod(name: &str, length: f64) -> BodyDefinition {
-    let j = length.powi(3) / 12.0;
-    rigid(name, length, [0.5 * length, 0.0, 0.0], [0.0, j, j])
-}
-
-const CRANK: f64 = 0.5;
-const COUPLER: f64 = 1.75;
-const ROCKER: f64 = 1.5;
-
-/// The four-bar cut at joint `cut`: A crank-ground, B crank-coupler, C coupler-rocker, D rocker-ground. Rods from A to D along the loop,
-/// the rocker from D to C.
-pub fn four_bar(cut: char, method: &str) -> (System, State) {
-    let bodies = vec![rod("crank", CRANK), rod("coupler", COUPLER), rod("rocker", ROCKER)];
-    let ground = [2.0, 0.0, 0.0];
-    let end = |l: f64| [l, 0.0, 0.0];
-    let angle = |mut h: HingeDefinition, q: f64, v: f64, held: bool| {
-        (h.position, h.velocity, h.held) = (vec![q], vec![v], held);
-        h
-    };
-    let revolute = |name: &str, parent: &str, child: &str, at| hinge(name, "revolute", &[Z], parent, child, at);
-    let from = |mut h: HingeDefinition, at: [f64; 3]| {
-        h.child_frame.position = Vector3::from(at);
-        h
-    };
-    let crank = angle(revolute("A", WORLD, "crank", [0.0; 3]), std::f64::consts::FRAC_PI_3, 2.0, true);
-    let join = |name, a: &str, at_a, b: &str, at_b| closure(name, "revolute", &[Z], a, at_a, b, at_b);
-    let (hinges, closing) = match cut {
-        'D' => {
-            let coupler = angle(revolute("B", "crank", "coupler", end(CRANK)), -0.7, 0.0, false);
-            let rocker = angle(from(revolute("C", "coupler", "rocker", end(COUPLER)), end(ROCKER)), 1.6, 0.0, false);
-            (vec![crank, coupler, rocker], join("D", WORLD, ground, "rocker", [0.0; 3]))
-        }
-        'C' => {
-            let coupler = angle(revolute("B", "crank", "coupler", end(CRANK)), -0.7, 0.0, false);
-            let rocker = angle(revolute("D", WORLD, "rocker", ground), 1.8, 0.0, false);
-            (vec![crank, coupler, rocker], join("C", "coupler", end(COUPLER), "rocker", end(ROCKER)))
-        }
-        _ => {
-            let rocker = angle(revolute("D", WORLD, "rocker", ground), 1.8, 0.0, false);
-            let coupler = angle(from(revolute("C", "rocker", "coupler", end(ROCKER)), end(COUPLER)), -1.5, 0.0, false);
-            (vec![crank, rocker, coupler], join("B", "crank", end(CRANK), "coupler", [0.0; 3]))
-        }
-    };
-    let gravity = Vector3::new(0.0, -G, 0.0);
-    let (system, mut state) =
-        held_by(method, Definition { gravity, bodies, hinges, closures: vec![closing], ..Definition::default() }).build().unwrap();
-    let done = assembly::assemble(&system, &mut state).unwrap();
-    assert!(done.positions && done.rates);
-    (system, state)
-}
-
 /// Angular accelerations of crank, coupler and rocker, and the force through every joint in inertial axes, on the body further along the
 /// loop from A to D (on the ground at D).
 fn four_bar_result(cut: char, method: &str) -> ([f64; 3], [Vector3<f64>; 4]) {
@@ -254,108 +189,6 @@ fn published_gear_pair_shares_the_torque() {
         let lambda = workspace.closed.as_ref().unwrap().lambda[0];
         let found = [workspace.acceleration.hinge[0], lambda];
         assert_close(&found, &[1.538_461_538_461_538_5, -2.307_692_307_692_307_6], 1e-14, method);
-    }
-}
-
-/// N four-bars side by side: rockers on the ground, couplers on the rockers, closures where a coupler meets the next rocker.
-pub fn row_of_four_bars(count: usize, method: &str) -> (System, State) {
-    let (mut bodies, mut hinges, mut closures) = (Vec::new(), Vec::new(), Vec::new());
-    let end = [1.0, 0.0, 0.0];
-    for i in 0..=count {
-        bodies.push(rod(&format!("rocker{i}"), 1.0));
-        let mut foot = hinge(&format!("foot{i}"), "revolute", &[Z], WORLD, &format!("rocker{i}"), [i as f64, 0.0, 0.0]);
-        (foot.position, foot.velocity) = (vec![std::f64::consts::FRAC_PI_2], vec![-1.0]);
-        hinges.push(foot);
-    }
-    for i in 0..count {
-        bodies.push(rod(&format!("coupler{i}"), 1.0));
-        let mut head = hinge(&format!("head{i}"), "revolute", &[Z], &format!("rocker{i}"), &format!("coupler{i}"), end);
-        (head.position, head.velocity) = (vec![-std::f64::consts::FRAC_PI_2], vec![1.0]);
-        hinges.push(head);
-        closures.push(closure(&format!("close{i}"), "revolute", &[Z], &format!("coupler{i}"), end, &format!("rocker{}", i + 1), end));
-    }
-    let definition = Definition { gravity: Vector3::new(0.0, -G, 0.0), bodies, hinges, closures, ..Definition::default() };
-    held_by(method, definition).build().unwrap()
-}
-
-/// C01: through a change point every half turn, where the rank drops from N to 1 and more motions open.
-#[test]
-fn published_two_four_bars_pass_their_change_points() {
-    for method in METHODS {
-        let (system, start) = row_of_four_bars(2, method);
-        let (mut residual, mut energies) = (0.0_f64, Vec::new());
-        let mut frames = vec![WorldFrame::default(); system.bodies.len()];
-        let summary = run(&system, &start, rk4(1e-3), 10.0, 50.0, |s| {
-            let (energy, _) = balance(s.system, s.state, s.workspace, &mut frames);
-            energies.push(energy.total());
-            residual = (0..2).map(|i| s.workspace.pose.closure_residual(s.system, i)).fold(residual, f64::max);
-        });
-        let first = system.hinge_index("foot0").unwrap();
-        let (q, v) = (summary.end.position[system.bodies[first].position], summary.end.velocity[system.bodies[first].velocity]);
-        let found = [q.cos(), q.sin(), -v * q.sin(), v * q.cos()];
-        let drift = energies.iter().map(|e| (e - energies[0]).abs()).fold(0.0, f64::max) / (G * 2.0);
-        println!("two four-bars: {found:?}, residual {residual:e}, energy {drift:e}, {} steps", summary.steps);
-        let expected = [0.328_458_111_540_815_4, 0.944_518_538_178_601, 1.423_051_470_206_944_1, -0.494_868_845_487_042_96];
-        assert_close(&found, &expected, 1e-6, "B0 at t = 10 s");
-        assert!(residual < 1e-9 && drift < 1e-7, "{residual:e} {drift:e}");
-    }
-}
-
-/// Five moving rods of the Bricard linkage; the sixth side is the ground.
-fn bricard(method: &str) -> (System, State) {
-    let points = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, -1.0, 0.0], [1.0, -1.0, 1.0], [0.0, -1.0, 1.0], [0.0, 0.0, 1.0]];
-    let axes = [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]];
-    let (slim, long) = (0.02 / 12.0, 1.01 / 12.0);
-    let (mut bodies, mut hinges) = (Vec::new(), Vec::new());
-    let mut before = Vector3::zeros();
-    for i in 0..5 {
-        let along = Vector3::from(points[i + 1]) - Vector3::from(points[i]);
-        let inertia = Matrix3::from_diagonal_element(long) - along * along.transpose() * (long - slim);
-        let kind = BodyDefinitionKind::Rigid { mass: 1.0, center_of_mass: along * 0.5, inertia };
-        bodies.push(BodyDefinition { name: format!("rod{i}"), kind });
-        let parent = if i == 0 { WORLD.to_owned() } else { format!("rod{}", i - 1) };
-        hinges.push(hinge(&format!("P{i}"), "revolute", &[axes[i]], &parent, &format!("rod{i}"), before.into()));
-        before = along;
-    }
-    let closures = vec![closure("P5", "revolute", &[axes[5]], WORLD, points[5], "rod4", before.into())];
-    let definition = Definition { gravity: Vector3::new(0.0, -G, 0.0), bodies, hinges, closures, ..Definition::default() };
-    held_by(method, definition).build().unwrap()
-}
-
-/// C04: one blocked direction too many at all times.
-#[test]
-fn published_bricard_linkage_moves_with_a_redundant_closure() {
-    for method in METHODS {
-        let (system, start) = bricard(method);
-        let workspace = evaluated(&system, &start);
-        let report = workspace.closed.as_ref().unwrap().rank_report(&system, &workspace.pose);
-        println!("Bricard: {report:?}");
-        assert_eq!((report.rank, report.rows, report.redundant), (4, 5, vec!["P5".to_owned()]));
-        let summary = run(&system, &start, dormand_prince(1e-9), 1.0, 20.0, |_| {});
-        let workspace = evaluated(&system, &summary.end);
-        let mut frames = vec![WorldFrame::default(); 5];
-        world_frames(&system, &workspace.pose, &mut frames);
-        let found = frames[3].position;
-        println!("Bricard: P3 {found:?}, {} steps", summary.steps);
-        assert_close(found.as_slice(), &[0.510_501_46, -1.649_167_60, 0.140_123_11], 1e-6, "P3 at t = 1 s");
-    }
-}
-
-/// C11: reactions that equilibrium does not determine are those of least norm.
-#[test]
-fn bar_pinned_at_both_ends_carries_its_weight_and_no_axial_force() {
-    for method in METHODS {
-        let hinges = vec![hinge("left", "revolute", &[Z], WORLD, "bar", [0.0; 3])];
-        let closures = vec![closure("right", "spherical", &[], WORLD, [2.0, 0.0, 0.0], "bar", [2.0, 0.0, 0.0])];
-        let gravity = Vector3::new(0.0, -G, 0.0);
-        let definition = Definition { gravity, bodies: vec![rod("bar", 2.0)], hinges, closures, ..Definition::default() };
-        let (system, state) = held_by(method, definition).build().unwrap();
-        let workspace = evaluated(&system, &state);
-        let chain = workspace.closed.as_ref().unwrap();
-        let right: Vec<f64> = workspace.closure_load(&system, 0).as_slice()[3..].to_vec();
-        assert_close(&right, &[0.0, G, 0.0], 1e-14, "right reaction");
-        assert_close(&hinge_load(&workspace, 0).as_slice()[3..], &[0.0, G, 0.0], 1e-14, "left reaction");
-        assert_eq!(chain.rank_report(&system, &workspace.pose).redundant, ["right"]);
     }
 }
 

@@ -1,6 +1,6 @@
 //! Cost of both methods for loops: against the number of loops, their size, and modes inside.
 
-use crate::closed_chain::{closure, rod};
+use crate::support::linkages::{closure, rod};
 use crate::support::loops::{METHODS, close_here, held_by};
 use crate::support::lumped::lumped_body;
 use crate::support::scenes::{G, Z, flexible, hinge, rk4};

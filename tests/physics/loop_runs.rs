@@ -1,6 +1,6 @@
 //! Loops over long times: closed to rounding, with the energy drift of the integrator and no other.
 
-use crate::closed_chain::{closure, four_bar, rod, row_of_four_bars};
+use crate::support::linkages::{closure, four_bar, rod, row_of_four_bars};
 use crate::support::loops::{METHODS, held_by};
 use crate::support::scenes::{G, Z, dormand_prince, hinge, rk4, run};
 use nalgebra::Vector3;

@@ -7,7 +7,6 @@ mod support;
 mod closed_chain;
 mod conservation;
 mod convergence;
-mod extremes;
 mod first_principles;
 mod identities;
 mod loop_cost;

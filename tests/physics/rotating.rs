@@ -1,37 +1,24 @@
-//! Spinning beams: stiffening by geometric stiffness (F03, F04), and the exact softening without it (S06). Labels are those of the
-//! project's list of reference problems.
+//! Spinning beams: stiffening by geometric stiffness, and the exact motion without it (F03, F04). Labels are those of the project's list
+//! of reference problems; spin beyond softening is in the stability suite.
 
 use crate::support::assert_close;
 use crate::support::scenes::{
-    Watch, Z, dormand_prince, exact_beam, flexible, hinge, polynomial_beam, rigid, run, slopes, stiffened, stiffened_beam,
+    Watch, Z, dormand_prince, exact_beam, flexible, hinge, polynomial_beam, rate_at_start, rigid, run, slopes, spinning, stiffened,
+    stiffened_beam,
 };
-use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use nalgebra::{DMatrix, DVector};
 use pliant::dynamics::energy::balance;
 use pliant::dynamics::world::WorldFrame;
 use pliant::dynamics::{DynamicsError, Workspace, forward_dynamics};
 use pliant::integrate::{Observer, Settings, simulate};
+use pliant::model::TimeFunction;
 use pliant::model::build::{BodyDefinition, Definition, WORLD};
 use pliant::model::modal_body::ModalBody;
 use pliant::model::time_function::Table;
-use pliant::model::{State, System, TimeFunction};
 use pliant::output::stiffening::StiffeningGauge;
 use std::f64::consts::TAU;
 
 const Y: [f64; 3] = [0.0, 1.0, 0.0];
-
-/// A hub that turns about `axis` by `motion`, with `beam` clamped at the distance `radius` along x.
-fn spinning(beam: BodyDefinition, axis: [f64; 3], radius: f64, motion: TimeFunction) -> (System, State) {
-    let mut spin = hinge("spin", "revolute", &[axis], WORLD, "hub", [0.0; 3]);
-    spin.motion = Some(motion);
-    let clamp = hinge("clamp", "fixed", &[], "hub", "beam", [radius, 0.0, 0.0]);
-    let bodies = vec![rigid("hub", 1.0, [0.0; 3], [1.0; 3]), beam];
-    Definition { bodies, hinges: vec![spin, clamp], ..Definition::default() }.build().unwrap()
-}
-
-/// At t = 0: no angle, the rate `rate` and no acceleration.
-fn rate_at_start(rate: f64) -> TimeFunction {
-    TimeFunction::Sine { amplitude: vec![rate], frequency_hz: 1.0 / TAU, phase: 0.0 }
-}
 
 /// Stiffness of the modes at a steady spin, from their accelerations: linear in the deflection where the hub's motion is prescribed.
 fn spin_stiffness(beam: &BodyDefinition, axis: [f64; 3], radius: f64, rate: f64) -> DMatrix<f64> {
@@ -198,78 +185,6 @@ fn slow_spin_up_follows_the_modal_equations_with_and_without_stiffening() {
         // steps of 0.06 rad of the third mode, whose share of the tip is 1e-3: (0.06)^4 / 120 of it per radian over 1e3 rad
         assert_close(&[found], &[expected], 1e-6, "slow spin-up");
     }
-}
-
-/// Two modes of unit mass along x and y with the natural frequencies `omega`, which a spin couples by Coriolis forces only.
-fn two_modes(omega: [f64; 2]) -> ModalBody {
-    let mut body = exact_beam(2);
-    body.frequency_hz = omega.map(|w| w / TAU).to_vec();
-    body.momentum = vec![Vector3::zeros(); 2];
-    body.first_moment = vec![Matrix3::zeros(); 2];
-    body.second_moment = (0..4).map(|i| Matrix3::from_fn(|a, b| if (a, b) == (i / 2, i % 2) { 1.0 } else { 0.0 })).collect();
-    body
-}
-
-/// Eigenvalues of the linear motion of the modes at the steady spin `rate` about z.
-fn eigenvalues(body: BodyDefinition, rate: f64) -> Vec<nalgebra::Complex<f64>> {
-    let (system, mut state) = spinning(body, Z, 0.0, rate_at_start(rate));
-    state.apply_prescribed(&system);
-    let n = state.modal_position.len();
-    let mut workspace = Workspace::new(&system);
-    let mut matrix = DMatrix::zeros(2 * n, 2 * n);
-    for k in 0..2 * n {
-        let unit = |j: usize| if j == k { 1.0 } else { 0.0 };
-        (0..n).for_each(|j| (state.modal_position[j], state.modal_velocity[j]) = (unit(j), unit(n + j)));
-        forward_dynamics(&system, &state, &mut workspace).unwrap();
-        for j in 0..n {
-            matrix[(j, k)] = unit(n + j);
-            matrix[(n + j, k)] = workspace.acceleration.modal[j];
-        }
-    }
-    matrix.complex_eigenvalues().iter().copied().collect()
-}
-
-/// S06: spin beyond the natural frequency of modes across the axis.
-#[test]
-fn published_softening_grows_as_the_plain_model_says() {
-    let growth = |rate| eigenvalues(flexible("beam", two_modes([1.0, 2.0])), rate).iter().fold(0.0_f64, |a, z| a.max(z.re));
-    let turning = |rate| {
-        let mut found: Vec<f64> =
-            eigenvalues(flexible("beam", two_modes([1.0, 2.0])), rate).iter().map(|z| z.im).filter(|x| *x > 0.0).collect();
-        found.sort_by(f64::total_cmp);
-        found
-    };
-    // the bound of the list; eigenvalues of four by four matrices keep some 1e-14 of the largest entry, 1e8 at the spin of 1e4,
-    // where pairs of eigenvalues lie 3 apart
-    assert_close(&[growth(1.5)], &[0.474_275_432_141_598], 1e-8, "growth at 1.5");
-    assert_close(&turning(3.0), &[1.376_703_905_656_81, 4.593_983_713_091_42], 1e-8, "stable at 3");
-    assert_close(&turning(1e4), &[9_998.418_861_168_14, 10_001.581_138_831_9], 1e-8, "stable at 1e4");
-    assert!(growth(3.0) < 1e-12);
-
-    // one mode, just beyond: cosh of the growth rate
-    let mut body = exact_beam(1);
-    body.frequency_hz = vec![1.0 / TAU];
-    let pole = eigenvalues(flexible("beam", body.clone()), 1.01).iter().fold(0.0_f64, |a, z| a.max(z.re));
-    assert_close(&[pole], &[0.141_774_468_787_578_252], 1e-8, "growth at 1.01");
-
-    // a hub too heavy to feel the beam keeps the spin; reaction changes it by 1e-13
-    let spin = hinge("spin", "revolute", &[Z], WORLD, "hub", [0.0; 3]);
-    let clamp = hinge("clamp", "fixed", &[], "hub", "beam", [0.0; 3]);
-    let hub = rigid("hub", 1.0, [0.0; 3], [1e13; 3]);
-    let definition = Definition { bodies: vec![hub, flexible("beam", body)], hinges: vec![spin, clamp], ..Definition::default() };
-    let (system, mut state) = definition.build().unwrap();
-    (state.velocity[0], state.modal_position[0]) = (1.01, 1e-3);
-    let mut end = 0.0;
-    let mut gauge = StiffeningGauge::new(&system);
-    run(&system, &state, dormand_prince(1e-12), 10.0, 1.0, |s| {
-        gauge.follow(s);
-        end = s.state.modal_position[0];
-    });
-    assert_close(&[end / 1e-3], &[2.185_030_114_346_834_51], 1e-8, "deflection after 10 s");
-    let warnings = gauge.warnings(&system);
-    // 1.01^2
-    assert!(warnings.len() == 1 && warnings[0].contains("spin takes 102.01 % of the stiffness of mode 1"), "{warnings:?}");
-    assert!(warnings[0].contains("without bound") && warnings[0].contains("no geometric stiffness"), "{warnings:?}");
 }
 
 #[test]

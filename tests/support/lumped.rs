@@ -20,8 +20,13 @@ pub fn vector(rng: &mut StdRng, size: f64) -> Vector3<f64> {
 
 /// Body of `modes` modes; interfaces "root" (at the origin), "mid" and "tip" with random rotations.
 pub fn lumped_body(rng: &mut StdRng, boundary: Boundary, modes: usize) -> LumpedBody {
-    let count = modes + 8;
-    let masses: Vec<f64> = (0..count).map(|_| rng.random_range(0.2..1.5)).collect();
+    let masses = (0..modes + 8).map(|_| rng.random_range(0.2..1.5)).collect();
+    lumped_body_of(rng, boundary, modes, masses)
+}
+
+/// The same of nodes of given masses, the root's first; at most as many modes as the nodes have directions left.
+pub fn lumped_body_of(rng: &mut StdRng, boundary: Boundary, modes: usize, masses: Vec<f64>) -> LumpedBody {
+    let count = masses.len();
     let mut points: Vec<_> = (0..count).map(|_| vector(rng, 1.0)).collect();
     points[0] = Vector3::zeros();
 

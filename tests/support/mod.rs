@@ -1,6 +1,7 @@
 //! Shared by the test binaries: random systems made of lumped nodes, and comparisons.
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
+pub mod linkages;
 pub mod loops;
 pub mod lumped;
 pub mod scenes;

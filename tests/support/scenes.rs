@@ -7,7 +7,7 @@ use pliant::integrate::{Flow, Observer, Outcome, Sample, Settings, Summary, simu
 use pliant::model::build::{BodyDefinition, BodyDefinitionKind, Definition, FlexibleDefinition, Frame, HingeDefinition, WORLD};
 use pliant::model::flexible_body::ModalIntegrals;
 use pliant::model::modal_body::{Boundary, Interface, ModalBody};
-use pliant::model::{InertiaOrder, State, System};
+use pliant::model::{InertiaOrder, State, System, TimeFunction};
 use std::sync::Arc;
 
 pub const G: f64 = 9.81;
@@ -221,6 +221,20 @@ pub fn polynomial_beam(modes: usize) -> ModalBody {
         matrices[8] = matrices[7].clone();
     }
     body
+}
+
+/// A hub that turns about `axis` by `motion`, with `beam` clamped at the distance `radius` along x.
+pub fn spinning(beam: BodyDefinition, axis: [f64; 3], radius: f64, motion: TimeFunction) -> (System, State) {
+    let mut spin = hinge("spin", "revolute", &[axis], WORLD, "hub", [0.0; 3]);
+    spin.motion = Some(motion);
+    let clamp = hinge("clamp", "fixed", &[], "hub", "beam", [radius, 0.0, 0.0]);
+    let bodies = vec![rigid("hub", 1.0, [0.0; 3], [1.0; 3]), beam];
+    Definition { bodies, hinges: vec![spin, clamp], ..Definition::default() }.build().unwrap()
+}
+
+/// At t = 0: no angle, the rate `rate` and no acceleration.
+pub fn rate_at_start(rate: f64) -> TimeFunction {
+    TimeFunction::Sine { amplitude: vec![rate], frequency_hz: 1.0 / std::f64::consts::TAU, phase: 0.0 }
 }
 
 /// An observer made of a closure.

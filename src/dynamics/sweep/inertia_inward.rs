@@ -11,6 +11,7 @@
 //! hinge becomes `H P H* + N`, the unit modal mass `Lambda`, and every formula above stays as it is.
 #![expect(non_snake_case, reason = "symbols follow the table in dynamics/mod.rs")]
 
+use super::graded::GradedInertia;
 use super::pose_outward::PoseScratch;
 use crate::dynamics::DynamicsError;
 use crate::dynamics::aggregate::inertia::AggregateInertia;
@@ -18,7 +19,7 @@ use crate::dynamics::modal_block::{ModalBlock, SingularBlock, outer_sum};
 use crate::model::hinge::MAX_RATES;
 use crate::model::{Body, BodyKind, HingeKind, Role, System};
 use crate::spatial::SpatialInertia;
-use crate::spatial::shift::{force_from, motion_to};
+use crate::spatial::shift::{force_from, motion_to, rotate_back};
 use nalgebra::{Matrix6, Vector3, Vector6};
 
 /// What the sweep leaves of one hinge.
@@ -79,6 +80,10 @@ pub struct InertiaScratch {
     pub aggregates: Vec<AggregateInertia>,
     /// Whether something was added to the mass matrix, so that a free hinge transmits forces.
     pub with_added: bool,
+    /// Factors of the inertias, for systems whose masses ask for them.
+    pub graded: Option<Box<GradedInertia>>,
+    /// Per body: its children, for those whose hinge inertia is doubtful.
+    children: Vec<Vec<usize>>,
 }
 
 /// What a linearly implicit integrator adds to the mass matrix.
@@ -103,12 +108,12 @@ impl InertiaScratch {
             G: [Vector6::zeros(); MAX_RATES],
             D: [[0.0; MAX_RATES]; MAX_RATES],
         };
-        let mut children = vec![Vec::new(); system.bodies.len()];
+        let (mut children, mut all_children) = (vec![Vec::new(); system.bodies.len()], vec![Vec::new(); system.bodies.len()]);
         let inside = |k, parent| system.aggregates.iter().any(|a| a.member_of(k).is_some() && a.member_of(parent).is_some());
         for (k, body) in system.bodies.iter().enumerate() {
-            if let Some(parent) = body.parent.filter(|_| body.parent_side.moves())
-                && !inside(k, parent)
-            {
+            let Some(parent) = body.parent else { continue };
+            all_children[parent].push(k);
+            if body.parent_side.moves() && !inside(k, parent) {
                 children[parent].push(k);
             }
         }
@@ -129,6 +134,8 @@ impl InertiaScratch {
             flexible: system.bodies.iter().enumerate().filter_map(eliminate).collect(),
             aggregates: system.aggregates.iter().map(AggregateInertia::new).collect(),
             with_added: false,
+            graded: GradedInertia::new(system).map(Box::new),
+            children: all_children,
         }
     }
 }
@@ -176,15 +183,25 @@ pub fn inertia_inward_with(
         } else if let Some(index) = pose.bodies[k].flexible {
             let diagonal = added.map(|a| &a.modal[body.modal_range()]);
             eliminate_modes(pose, k, index, diagonal, out)
-                .map_err(|SingularBlock| DynamicsError::SingularModes { body: body.name.clone() })?;
+                .map_err(|SingularBlock { empty }| DynamicsError::SingularModes { body: body.name.clone(), empty })?;
         } else {
             out.bodies[k].P_hinge = out.bodies[k].P;
         }
-        let own = &mut out.bodies[k];
         let block = added.and_then(|a| a.hinge[k].as_ref());
-        eliminate_hinge(body, &pose.bodies[k].hinge.map, block, own)
-            .map_err(|(rate, inertia, scale)| DynamicsError::of_hinge(system, k, rate, inertia, scale))?;
+        let map = &pose.bodies[k].hinge.map;
+        let children = &out.children;
+        let (inner, outer) = out.bodies.split_at_mut(k + 1);
+        let own = &mut inner[k];
+        // whatever moves or holds the frame beside its children makes the rough size the best that is known
+        let exact = matches!((&body.kind, role), (BodyKind::Rigid(_), Role::Own));
+        let terms = |h: &Vector6<f64>| if exact { sum_of_terms(system, pose, k, h, &children[k], outer) } else { f64::INFINITY };
+        match out.graded.as_deref_mut().filter(|_| added.is_none()) {
+            Some(graded) => graded.eliminate(system, pose, k, &children[k], own),
+            None => eliminate_hinge(body, map, block, own, terms),
+        }
+        .map_err(|pivot| DynamicsError::of_hinge(system, pose, k, pivot))?;
         if let Some(parent) = body.parent {
+            let own = &mut out.bodies[k];
             own.S = own.P_plus.rotated(&pose.bodies[k].rotation);
             let felt = own.S.moved_by(&pose.bodies[k].l);
             out.bodies[parent].P = out.bodies[parent].P.plus(&felt);
@@ -298,10 +315,11 @@ impl RootElimination {
             X.set_column(i, &sum);
         }
         let symmetric = (left + left.transpose()) * 0.5;
-        self.frame_inverse = symmetric.cholesky().ok_or(SingularBlock)?.inverse();
+        let empty = || symmetric.symmetric_eigenvalues().min() >= -1e-9 * symmetric.trace();
+        self.frame_inverse = symmetric.cholesky().ok_or_else(|| SingularBlock { empty: empty() })?.inverse();
         self.frame_per_force = self.frame_inverse * X.transpose();
         direct += X * self.frame_per_force;
-        self.P = ((direct + direct.transpose()) * 0.5).cholesky().ok_or(SingularBlock)?.inverse();
+        self.P = ((direct + direct.transpose()) * 0.5).cholesky().ok_or(SingularBlock { empty: false })?.inverse();
         for (m, e) in self.modal_per_force.iter_mut().zip(gain_modal) {
             *m -= self.frame_per_force.tr_mul(e);
         }
@@ -312,13 +330,57 @@ impl RootElimination {
 /// Pivots at or below this multiple of what they were formed from are rounding, not inertia.
 pub const SINGULAR: f64 = 8.0 * f64::EPSILON;
 
-/// Hinge of a body: `D = H P H*` and what is `added`, `G = P H* D^-1`, `P+ = P - G D G*` (Eq. 33). Errors: (rate, pivot, scale).
+/// What is wrong with a hinge: (rate, pivot, what the pivot was compared with).
+pub(super) type SingularPivot = (usize, f64, f64);
+
+/// Refuses a pivot of the hinge of rate `rate` that is rounding of what it was formed from: of `size` at most, of `terms` at closer look.
+///
+/// `size` is the trace of `P`. It holds inertia about locked axes too, which may be far larger than what the hinge moves without adding a
+/// digit of noise to it; so the sum of the magnitudes of the very terms is taken, where the rough size is not enough. A pivot that is not
+/// a normal number has no inverse.
+#[inline]
+pub(super) fn check_pivot(rate: usize, pivot: f64, size: f64, terms: impl FnOnce() -> f64) -> Result<(), SingularPivot> {
+    if pivot > SINGULAR * size && pivot >= f64::MIN_POSITIVE {
+        return Ok(());
+    }
+    let scale = size.min(terms());
+    if pivot > SINGULAR * scale && pivot >= f64::MIN_POSITIVE { Ok(()) } else { Err((rate, pivot, scale)) }
+}
+
+/// `sum |h_a| |M_ab| |h_b|` of a symmetric inertia.
+fn magnitude(inertia: &SpatialInertia, h: &Vector6<f64>) -> f64 {
+    h.abs().dot(&(inertia.matrix().abs() * h.abs()))
+}
+
+/// Magnitudes of what `h P h*` of rigid body `k` is the sum of: its own inertia, and that of each child before the child's hinge took its
+/// share, in the axes in which it was found.
+fn sum_of_terms(system: &System, pose: &PoseScratch, k: usize, h: &Vector6<f64>, children: &[usize], outer: &[BodyInertia]) -> f64 {
+    let own = match &system.bodies[k].kind {
+        BodyKind::Rigid(inertia) => magnitude(inertia, h),
+        BodyKind::Flexible(_) => f64::INFINITY,
+    };
+    let of_child = |&child: &usize| {
+        let (at, felt) = (&pose.bodies[child], &outer[child - k - 1].P_hinge);
+        let seen = rotate_back(&at.rotation, &motion_to(&at.l, h));
+        let moves = system.bodies[child].hinge.kind.rate_count() > 0 && !system.bodies[child].hinge.is_prescribed();
+        if moves && system.bodies[child].mode_count() == 0 { magnitude(felt, &seen) } else { rough_size(felt, &seen) }
+    };
+    own + children.iter().map(of_child).sum::<f64>()
+}
+
+/// Size of `h P h*` and of all that may have cancelled in it.
+pub(super) fn rough_size(P: &SpatialInertia, h: &Vector6<f64>) -> f64 {
+    P.rotational.trace() * h.fixed_rows::<3>(0).norm_squared() + P.translational.trace() * h.fixed_rows::<3>(3).norm_squared()
+}
+
+/// Hinge of a body: `D = H P H*` and what is `added`, `G = P H* D^-1`, `P+ = P - G D G*` (Eq. 33). `terms`: see [`check_pivot`].
 fn eliminate_hinge(
     body: &Body,
     map: &[Vector6<f64>; MAX_RATES],
     added: Option<&[[f64; MAX_RATES]; MAX_RATES]>,
     own: &mut BodyInertia,
-) -> Result<(), (usize, f64, f64)> {
+    terms: impl Fn(&Vector6<f64>) -> f64,
+) -> Result<(), SingularPivot> {
     own.P_plus = own.P_hinge;
     let m = body.hinge.kind.rate_count();
     if m == 0 || body.hinge.is_prescribed() {
@@ -329,11 +391,8 @@ fn eliminate_hinge(
     for i in 0..m {
         U[i] = P.times(&map[i]);
     }
-    // size of what a pivot is the sum of: rounding of D grows with it
-    let (turn, travel) = (P.rotational.trace(), P.translational.trace());
     let D = &mut own.D;
     for i in 0..m {
-        let scale = turn * map[i].fixed_rows::<3>(0).norm_squared() + travel * map[i].fixed_rows::<3>(3).norm_squared();
         for j in 0..=i {
             let mut sum = map[i].dot(&U[j]) + added.map_or(0.0, |n| n[i][j]);
             for c in 0..j {
@@ -341,9 +400,7 @@ fn eliminate_hinge(
             }
             D[i][j] = if i == j { sum } else { sum / D[j][j] };
         }
-        if !(D[i][i] > SINGULAR * scale) {
-            return Err((i, D[i][i], scale));
-        }
+        check_pivot(i, D[i][i], rough_size(P, &map[i]), || terms(&map[i]))?;
     }
     if matches!(body.hinge.kind, HingeKind::Free) && added.is_none() {
         // nothing passes a free hinge: exactly zero instead of rounding
@@ -359,17 +416,25 @@ fn eliminate_hinge(
             own.P_plus.subtract_outer(&w[i], D[i][i]);
         }
     }
-    for row in 0..6 {
-        let mut x = [0.0; MAX_RATES];
-        for i in 0..m {
-            x[i] = U[i][row];
-        }
-        solve_hinge(D, &mut x[..m]);
-        for i in 0..m {
-            own.G[i][row] = x[i];
+    own.solve_gain(&U[..m]);
+    Ok(())
+}
+
+impl BodyInertia {
+    /// `G = U D^-1` of `U = P H*`, one column per rate.
+    pub(super) fn solve_gain(&mut self, U: &[Vector6<f64>]) {
+        let m = U.len();
+        for row in 0..6 {
+            let mut x = [0.0; MAX_RATES];
+            for i in 0..m {
+                x[i] = U[i][row];
+            }
+            solve_hinge(&self.D, &mut x[..m]);
+            for i in 0..m {
+                self.G[i][row] = x[i];
+            }
         }
     }
-    Ok(())
 }
 
 /// `x <- D^-1 x` with the factors of D.

@@ -2,6 +2,7 @@
 
 pub mod acceleration_outward;
 pub mod force_inward;
+pub mod graded;
 pub mod inertia_inward;
 pub mod pose_outward;
 pub mod response;
