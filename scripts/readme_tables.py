@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Writes the measured tables of README.md between their markers: validation, cost, loops, study, residual. Needs target/release/pliant."""
+"""Writes the measured tables of README.md between their markers; TABLES names them. Needs target/release/pliant."""
 import argparse
 import json
 import math
@@ -117,6 +117,19 @@ def physics_test(name):
     return subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
 
 
+def stability_table():
+    """The rows that the stability suite prints: case, quantity, bound, measured."""
+    command = ["cargo", "test", "--release", "--locked", "--test", "stability", "--", "--nocapture", "--test-threads", "1"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    rows = re.findall(r"stability \| (.*) \| (.*) \| (.*) \| (.*)$", done.stdout, re.MULTILINE)
+    if done.returncode or not rows:
+        sys.exit(f"the stability suite failed: {done.stdout}{done.stderr}")
+    # numbered cases first; within a case as printed
+    rows.sort(key=lambda row: (not re.fullmatch(r"S\d+", row[0]), row[0]))
+    lines = ["| " + " | ".join(row) + " |" for row in [("case", "quantity", "bound", "measured"), ("---",) * 4, *rows]]
+    return re.sub(r"(?<=\d)e0\b", "", "\n".join(lines))
+
+
 def cost_table():
     """Cost per body as the scaling test prints it."""
     done = physics_test("cost_of_an_evaluation")
@@ -190,7 +203,14 @@ def residual_table():
     return "\n".join("| " + " | ".join(row) + " |" for row in rows)
 
 
-TABLES = {"validation": validation_table, "cost": cost_table, "loops": loops_table, "study": study_table, "residual": residual_table}
+TABLES = {
+    "validation": validation_table,
+    "stability": stability_table,
+    "cost": cost_table,
+    "loops": loops_table,
+    "study": study_table,
+    "residual": residual_table,
+}
 
 
 def main():
