@@ -73,10 +73,7 @@ fn by_diffsol(system: &System, start: &State, tolerance: f64) -> Vec<f64> {
     let problem = OdeBuilder::<NalgebraMat<f64>>::new()
         .rtol(tolerance)
         .atol([1e-3 * tolerance])
-        .rhs_implicit(
-            |y, _p, t, out| rate(y, t, out),
-            |y, _p, t, v, out| along(y, t, v, out),
-        )
+        .rhs_implicit(|y, _p, t, out| rate(y, t, out), |y, _p, t, v, out| along(y, t, v, out))
         .init(|_p, _t, y| y.copy_from_slice(&initial), size)
         .build()
         .unwrap();
