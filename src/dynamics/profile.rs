@@ -38,14 +38,23 @@ pub fn profile(system: &System, state: &State, budget: Duration) -> Result<Evalu
     forward_dynamics(system, state, &mut workspace)?;
     let Workspace { pose, velocity, inertia, force, acceleration, closed } = &mut workspace;
     let share = budget / 6;
-    let poses = quickest(share, || Ok(sweep::pose_outward::pose_outward(system, state, pose)))?;
+    let poses = quickest(share, || {
+        sweep::pose_outward::pose_outward(system, state, pose);
+        Ok(())
+    })?;
     let velocities = quickest(share, || {
         sweep::velocity_outward::velocity_outward(system, state, pose, velocity);
         closed_chain::check_embedded(system, pose, velocity)
     })?;
     let inertias = quickest(share, || sweep::inertia_inward::inertia_inward(system, pose, inertia))?;
-    let forces = quickest(share, || Ok(sweep::force_inward::force_inward(system, state, pose, velocity, inertia, force)))?;
-    let mut swept = || Ok(sweep::acceleration_outward::acceleration_outward(system, pose, velocity, inertia, force, acceleration));
+    let forces = quickest(share, || {
+        sweep::force_inward::force_inward(system, state, pose, velocity, inertia, force);
+        Ok(())
+    })?;
+    let mut swept = || {
+        sweep::acceleration_outward::acceleration_outward(system, pose, velocity, inertia, force, acceleration);
+        Ok(())
+    };
     let accelerations = quickest(share, &mut swept)?;
     // what closures add cannot be repeated alone: it is what a whole evaluation takes beyond its sweeps
     let mut time = EvaluationTime { poses, velocities, inertias, forces, accelerations, closures: 0.0 };
