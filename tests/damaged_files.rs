@@ -3,6 +3,10 @@
 //! Each mutant is read by the built program in a process of its own, because a fault of the C library could not be caught otherwise.
 #![cfg(feature = "hdf5")]
 
+#[path = "support/damage.rs"]
+mod damage;
+
+use damage::{KINDS, damage};
 use rand::rngs::StdRng;
 use rand::{Rng, SeedableRng};
 use std::path::{Path, PathBuf};
@@ -58,50 +62,6 @@ fn complaint(file: &Path) -> Option<String> {
     }
 }
 
-/// One seeded kind of damage.
-fn damage(bytes: &mut Vec<u8>, random: &mut StdRng) -> &'static str {
-    let length = bytes.len();
-    let span = |random: &mut StdRng| {
-        let from = random.random_range(0..length);
-        from..(from + random.random_range(1..=512)).min(length)
-    };
-    match random.random_range(0..6) {
-        0 => {
-            bytes.truncate(random.random_range(0..length));
-            "truncated"
-        }
-        1 => {
-            for _ in 0..random.random_range(1..=8) {
-                bytes[random.random_range(0..length)] ^= 1 << random.random_range(0..8);
-            }
-            "bits flipped"
-        }
-        2 => {
-            for _ in 0..random.random_range(1..=4) {
-                bytes[random.random_range(0..length.min(4096))] ^= 1 << random.random_range(0..8);
-            }
-            "bits flipped in the head"
-        }
-        3 => {
-            let span = span(random);
-            bytes[span].fill(0);
-            "block zeroed"
-        }
-        4 => {
-            let from = span(random);
-            let to = random.random_range(0..length - from.len());
-            bytes.copy_within(from, to);
-            "block copied"
-        }
-        _ => {
-            let at = random.random_range(0..length - 8) & !7;
-            let word = [u64::MAX, 1 << 63, 1 << 40, 1 << 31, 0][random.random_range(0..5)];
-            bytes[at..at + 8].copy_from_slice(&word.to_le_bytes());
-            "extreme word"
-        }
-    }
-}
-
 /// Mutants of one sample; all complaints with what reproduces them.
 fn stress(sample: &str, seed: u64) -> Vec<String> {
     let whole = std::fs::read(data(sample)).unwrap();
@@ -112,7 +72,8 @@ fn stress(sample: &str, seed: u64) -> Vec<String> {
     let count = std::env::var("PLIANT_MUTANTS").ok().and_then(|text| text.parse().ok()).unwrap_or(MUTANTS);
     for index in 0..count {
         let mut bytes = whole.clone();
-        let kind = damage(&mut bytes, &mut random);
+        let kind = random.random_range(0..KINDS);
+        let kind = damage(kind, &mut bytes, &mut random);
         std::fs::write(&file, &bytes).unwrap();
         if let Some(text) = complaint(&file) {
             if let Ok(keep) = std::env::var("PLIANT_KEEP_MUTANTS") {

@@ -5,6 +5,10 @@
 //! 100,000 of them over the five samples; PLIANT_KEEP_MUTANTS=FOLDER keeps those that fail.
 #![cfg(feature = "hdf5")]
 
+#[path = "support/damage.rs"]
+mod damage;
+
+use damage::KINDS;
 use rand::rngs::StdRng;
 use rand::{Rng, SeedableRng};
 use std::path::{Path, PathBuf};
@@ -87,45 +91,8 @@ fn complaint(file: &Path, keys: &Path) -> Option<String> {
 
 /// One seeded kind of damage.
 fn damage(bytes: &mut Vec<u8>, random: &mut StdRng, text: bool) -> &'static str {
-    let length = bytes.len();
-    let span = |random: &mut StdRng| {
-        let from = random.random_range(0..length);
-        from..(from + random.random_range(1..=512)).min(length)
-    };
-    match random.random_range(0..if text { 9 } else { 6 }) {
-        0 => {
-            bytes.truncate(random.random_range(0..length));
-            "truncated"
-        }
-        1 => {
-            for _ in 0..random.random_range(1..=8) {
-                bytes[random.random_range(0..length)] ^= 1 << random.random_range(0..8);
-            }
-            "bits flipped"
-        }
-        2 => {
-            for _ in 0..random.random_range(1..=4) {
-                bytes[random.random_range(0..length.min(4096))] ^= 1 << random.random_range(0..8);
-            }
-            "bits flipped in the head"
-        }
-        3 => {
-            let span = span(random);
-            bytes[span].fill(0);
-            "block zeroed"
-        }
-        4 => {
-            let from = span(random);
-            let to = random.random_range(0..length - from.len());
-            bytes.copy_within(from, to);
-            "block copied"
-        }
-        5 => {
-            let at = random.random_range(0..length - 8) & !7;
-            let word = [u64::MAX, 1 << 63, 1 << 40, 1 << 31, 0][random.random_range(0..5)];
-            bytes[at..at + 8].copy_from_slice(&word.to_le_bytes());
-            "extreme word"
-        }
+    match random.random_range(0..if text { KINDS + 3 } else { KINDS }) {
+        kind if kind < KINDS => damage::damage(kind, bytes, random),
         // what stands between quotes, tags or blanks, exchanged
         _ => {
             let is_edge = |b: &u8| b"\"'<> \n".contains(b);
