@@ -69,9 +69,9 @@ pub struct TruncationGauge {
     moving: NewtonEuler,
     generalised: [Vec<f64>; 2],
     oscillators: Vec<Oscillators>,
-    /// Time of the last force, and the two intervals before it.
+    /// Time of the last force, and the interval before it.
     time: Option<f64>,
-    interval: [f64; 2],
+    interval: f64,
     /// The retained system under the forces of the left-out modes.
     changed: Workspace,
     hinges: Vec<(usize, LoadEstimate)>,
@@ -106,7 +106,7 @@ impl TruncationGauge {
             generalised: [vec![0.0; all.velocity_count], vec![0.0; all.modal_count]],
             oscillators: oscillators.collect(),
             time: None,
-            interval: [0.0; 2],
+            interval: 0.0,
             changed,
             hinges: hinges.collect(),
             closures: closures.collect(),
@@ -134,9 +134,9 @@ impl TruncationGauge {
         for (left, oscillators) in modes.bodies.iter().zip(&mut self.oscillators) {
             let row = &modal[modes.system.bodies[left.body].modal_range()];
             oscillators.take_force(left, row);
-            oscillators.advance(left, step, self.interval[0]);
+            oscillators.advance(left, step, self.interval);
         }
-        self.interval = [step.unwrap_or(0.0), self.interval[0]];
+        self.interval = step.unwrap_or(0.0);
         self.time = Some(time);
     }
 
