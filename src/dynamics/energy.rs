@@ -81,6 +81,9 @@ pub fn balance(system: &System, state: &State, workspace: &Workspace, frames: &m
 /// the total energy.
 #[must_use]
 pub fn power(system: &System, state: &State, workspace: &Workspace) -> f64 {
+    if let Some(tree) = workspace.kernel() {
+        return tree.power(system, state);
+    }
     let mut total = 0.0;
     for (k, body) in system.bodies.iter().enumerate() {
         let v = &state.velocity[body.velocity_range()];

@@ -10,6 +10,9 @@ use nalgebra::Vector6;
 /// Load at the hinge of body `k` from the last evaluation: (moment N m about O; force N), by the parent on the child, O axes.
 #[must_use]
 pub fn hinge_load(workspace: &Workspace, k: usize) -> Vector6<f64> {
+    if let Some(tree) = workspace.kernel() {
+        return tree.hinge_load(k);
+    }
     workspace.inertia.bodies[k].P_plus.times(&workspace.acceleration.alpha_plus[k]) + workspace.force.bodies[k].z_plus
 }
 

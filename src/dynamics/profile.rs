@@ -36,7 +36,7 @@ impl EvaluationTime {
 pub fn profile(system: &System, state: &State, budget: Duration) -> Result<EvaluationTime, DynamicsError> {
     let mut workspace = Workspace::new(system);
     forward_dynamics(system, state, &mut workspace)?;
-    let Workspace { pose, velocity, inertia, force, acceleration, closed } = &mut workspace;
+    let Workspace { pose, velocity, inertia, force, acceleration, closed, .. } = &mut workspace;
     let share = budget / 6;
     let poses = quickest(share, || {
         sweep::pose_outward::pose_outward(system, state, pose);

@@ -3,7 +3,7 @@
 //! y = (increments of hinge and modal coordinates; hinge and modal rates; work of what is not conservative). Increments of
 //! rotations are rotation vectors with rate `Jr^-1 omega`, so y starts at zero increments in every step (a Munthe-Kaas method).
 
-use crate::dynamics::{DynamicsError, Workspace, energy, forward_dynamics};
+use crate::dynamics::{DynamicsError, Workspace, accelerations, energy};
 use crate::model::{State, System};
 use std::time::{Duration, Instant};
 
@@ -111,7 +111,7 @@ impl<'a> Chart<'a> {
     fn rate_at(&mut self, state: &State, y: &[f64], rate: &mut [f64]) -> Result<(), DynamicsError> {
         let started = self.evaluations.is_multiple_of(TIMED_EVERY).then(Instant::now);
         self.evaluations += 1;
-        let done = forward_dynamics(self.system, state, &mut self.workspace);
+        let done = accelerations(self.system, state, &mut self.workspace);
         if let Some(started) = started {
             self.timed.0 += started.elapsed();
             self.timed.1 += 1;

@@ -12,7 +12,7 @@ use super::tableau::Tableau;
 use super::w_tableau::ROS34PW2;
 use super::{Stepper, tableau};
 use crate::dynamics::closed_chain::drift;
-use crate::dynamics::{DynamicsError, Workspace, forward_dynamics};
+use crate::dynamics::{DynamicsError, Workspace, accelerations, forward_dynamics};
 use crate::model::hinge::HingePose;
 use crate::model::{Body, ClosureMethod, HingeKind, State, System};
 
@@ -265,7 +265,7 @@ impl Run<'_, '_> {
         }
         self.evaluations += 1;
         let closed = system.closures.is_empty() || drift::project(system, &mut self.sampled, &mut self.output).is_ok();
-        if closed && forward_dynamics(system, &self.sampled, &mut self.output).is_ok() {
+        if closed && accelerations(system, &self.sampled, &mut self.output).is_ok() {
             let error = LocalError { system, workspace: &self.chart.workspace, other: &self.output };
             observers.iter_mut().filter(|o| o.wants_local_errors()).for_each(|o| o.local_error(&error));
         }

@@ -13,6 +13,7 @@
 //! - **Hinge load**: what the parent exerts on the child across the hinge, moment about O, in O axes.
 
 pub mod inertia;
+pub mod lanes;
 pub mod rotation;
 pub mod shift;
 

@@ -16,6 +16,7 @@ mod published;
 mod published_flexible;
 mod published_loops;
 mod reference_solver;
+mod rigid_kernel;
 mod rotating;
 mod scaling;
 mod stiff;

@@ -331,7 +331,7 @@ impl RootElimination {
 pub const SINGULAR: f64 = 8.0 * f64::EPSILON;
 
 /// What is wrong with a hinge: (rate, pivot, what the pivot was compared with).
-pub(super) type SingularPivot = (usize, f64, f64);
+pub(in crate::dynamics) type SingularPivot = (usize, f64, f64);
 
 /// Refuses a pivot of the hinge of rate `rate` that is rounding of what it was formed from: of `size` at most, of `terms` at closer look.
 ///
@@ -374,7 +374,7 @@ pub(super) fn rough_size(P: &SpatialInertia, h: &Vector6<f64>) -> f64 {
 }
 
 /// Hinge of a body: `D = H P H*` and what is `added`, `G = P H* D^-1`, `P+ = P - G D G*` (Eq. 33). `terms`: see [`check_pivot`].
-fn eliminate_hinge(
+pub(in crate::dynamics) fn eliminate_hinge(
     body: &Body,
     map: &[Vector6<f64>; MAX_RATES],
     added: Option<&[[f64; MAX_RATES]; MAX_RATES]>,

@@ -1,0 +1,81 @@
+//! Third pass: accelerations and hinge loads, from the base to the tips. Source: Paper Eq. 13 and 18, in inertial axes.
+
+use super::{Branch, NONE, Outboard, RigidTree, arm, parent_motion};
+use crate::dynamics::sweep::force_inward::world_acceleration;
+use crate::model::{State, System};
+use crate::spatial::lanes::Lanes;
+use crate::spatial::shift::spatial;
+use nalgebra::Vector3;
+
+/// Fills `hinge` with the accelerations of the hinge rates, and the loads where there is room for them.
+#[inline(always)]
+pub fn accelerate<L: Lanes>(s: L, tree: &mut RigidTree, system: &System, state: &State, hinge: &mut [f64]) {
+    let RigidTree { layout, motion, gains, outboard, branches, general, .. } = tree;
+    let world = world_acceleration(system);
+    let at_world = (s.of_three([world[0], world[1], world[2]]), s.of_three([world[3], world[4], world[5]]));
+    let mut last = NONE;
+    let (mut angular, mut linear) = at_world;
+    for (k, link) in layout.links.iter().enumerate() {
+        if link.parent != last {
+            (angular, linear) = match layout.links.get(link.parent as usize).and_then(|p| branches.get(p.branch as usize)) {
+                Some(Branch { acceleration: a, .. }) => (s.of_three([a[0], a[1], a[2]]), s.of_three([a[3], a[4], a[5]])),
+                None => at_world,
+            };
+        }
+        if link.general == NONE {
+            let shape = &layout.shapes[link.shape as usize];
+            let (turn, omega) = parent_motion(s, link, motion);
+            let m = &motion[k];
+            let axis = s.load([m[6], m[7], m[8], m[9]]);
+            let at = arm(s, shape, turn, omega, axis, state.velocity[link.v as usize]);
+            // alpha+ = phi* alpha of the parent
+            linear = s.sub(linear, s.cross(at.l, angular));
+            if let Some(out) = outboard.get_mut(k) {
+                write_load(s, out, angular, linear);
+            }
+            (angular, linear) = (s.add(angular, at.angular), s.add(linear, at.linear));
+            let g = &gains[k];
+            let (gain_angular, gain_linear) = (s.load([g[0], g[1], g[2], g[3]]), s.load([g[3], g[4], g[5], g[6]]));
+            let acceleration = g[6] - s.dot_two(gain_angular, angular, gain_linear, linear);
+            hinge[link.v as usize] = acceleration;
+            angular = s.mul_add(axis, s.splat(acceleration), angular);
+        } else {
+            let own = &general[link.general as usize];
+            linear = s.sub(linear, s.cross(s.of_three(own.l.into()), angular));
+            if let Some(out) = outboard.get_mut(k) {
+                write_load(s, out, angular, linear);
+            }
+            let rates = system.bodies[k].velocity_range();
+            let outer = spatial(&Vector3::from(s.three(angular)), &Vector3::from(s.three(linear)));
+            let alpha = own.accelerate(system, &outer, &mut hinge[rates]);
+            (angular, linear) = (s.of_three([alpha[0], alpha[1], alpha[2]]), s.of_three([alpha[3], alpha[4], alpha[5]]));
+        }
+        if let Some(branch) = branches.get_mut(link.branch as usize) {
+            let (a, b) = (s.three(angular), s.three(linear));
+            branch.acceleration = [a[0], a[1], a[2], b[0], b[1], b[2]];
+        }
+        last = u32::try_from(k).unwrap_or(NONE);
+    }
+}
+
+/// `P+ alpha+ + z+`.
+#[inline(always)]
+fn write_load<L: Lanes>(s: L, out: &mut Outboard, angular: L::V, linear: L::V) {
+    let rotational = [column(s, out, 0), column(s, out, 3), column(s, out, 6)];
+    let coupling = [column(s, out, 9), column(s, out, 12), column(s, out, 15)];
+    let translational = [column(s, out, 18), column(s, out, 21), column(s, out, 24)];
+    let moment = s.combine_add(coupling, linear, s.combine_add(rotational, angular, column(s, out, 27)));
+    let force = s.three(s.combine_add(translational, linear, column(s, out, 30)));
+    let moment = s.three(moment);
+    // C' alpha: the columns of C on the angular acceleration
+    let by_coupling = [s.dot(coupling[0], angular), s.dot(coupling[1], angular), s.dot(coupling[2], angular)];
+    for i in 0..3 {
+        out[i] = moment[i];
+        out[i + 3] = force[i] + by_coupling[i];
+    }
+}
+
+#[inline(always)]
+fn column<L: Lanes>(s: L, out: &Outboard, at: usize) -> L::V {
+    s.load([out[at], out[at + 1], out[at + 2], out[at + 3]])
+}

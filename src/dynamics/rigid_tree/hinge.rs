@@ -1,0 +1,194 @@
+//! Hinges that are not plain revolute ones, prescribed ones, and external loads: in plain algebra, inertial axes.
+
+use super::layout::{Layout, NONE, Shape};
+use super::{Doubtful, Motion};
+use crate::dynamics::sweep::inertia_inward::{BodyInertia, eliminate_hinge, solve_hinge};
+use crate::model::hinge::{HingePose, MAX_RATES};
+use crate::model::{HingeKind, LoadAxes, LoadPoint, State, System};
+use crate::spatial::SpatialInertia;
+use crate::spatial::shift::{angular, force_from, linear, spatial};
+use nalgebra::{Matrix3, Vector3, Vector6};
+
+/// One such hinge: what the passes hand on, in inertial axes at O.
+#[derive(Debug, Clone)]
+pub struct GeneralHinge {
+    body: usize,
+    pose: HingePose,
+    /// O of the parent to O (m).
+    pub l: Vector3<f64>,
+    /// Velocity across the hinge.
+    relative: Vector6<f64>,
+    /// Hinge map.
+    map: [Vector6<f64>; MAX_RATES],
+    /// Bias acceleration, with `H* theta_ddot` of a prescribed hinge.
+    bias: Vector6<f64>,
+    /// O axes to inertial axes.
+    rotation: Matrix3<f64>,
+    /// Accelerations of a prescribed hinge.
+    prescribed: [f64; MAX_RATES],
+    applied: [f64; MAX_RATES],
+    nu: [f64; MAX_RATES],
+    inertia: BodyInertia,
+}
+
+impl GeneralHinge {
+    /// Of body `body`.
+    pub fn new(body: usize) -> Self {
+        let zero = SpatialInertia::default();
+        Self {
+            body,
+            pose: HingePose::default(),
+            l: Vector3::zeros(),
+            relative: Vector6::zeros(),
+            map: [Vector6::zeros(); MAX_RATES],
+            bias: Vector6::zeros(),
+            rotation: Matrix3::identity(),
+            prescribed: [0.0; MAX_RATES],
+            applied: [0.0; MAX_RATES],
+            nu: [0.0; MAX_RATES],
+            inertia: BodyInertia {
+                P: zero,
+                P_hinge: zero,
+                P_plus: zero,
+                S: zero,
+                G: [Vector6::zeros(); MAX_RATES],
+                D: [[0.0; MAX_RATES]; MAX_RATES],
+            },
+        }
+    }
+
+    /// First pass: pose, map and bias; returns the motion of the body.
+    pub fn follow(&mut self, system: &System, state: &State, shape: &Shape, parent: Option<&Motion>) -> Motion {
+        let body = &system.bodies[self.body];
+        let (turn, omega) =
+            parent.map_or((Matrix3::identity(), Vector3::zeros()), |m| (Matrix3::from_column_slice(&m[..9]), Vector3::new(m[9], m[10], m[11])));
+        let (q, v) = (&state.position[body.position_range()], &state.velocity[body.velocity_range()]);
+        body.hinge.kind.pose(q, &mut self.pose);
+        let outer = turn * Matrix3::from_column_slice(&shape.fixed);
+        self.rotation = outer * self.pose.rotation;
+        self.l = turn * Vector3::from(shape.offset) + outer * self.pose.translation;
+        let rotation = self.rotation;
+        let turned = |x: &Vector6<f64>| spatial(&(rotation * angular(x)), &(rotation * linear(x)));
+        self.relative = Vector6::zeros();
+        for (i, v) in v.iter().enumerate() {
+            self.map[i] = turned(&self.pose.map[i]);
+            self.relative += self.map[i] * *v;
+        }
+        let (spin, slide) = (angular(&self.relative), linear(&self.relative));
+        self.bias = spatial(&omega.cross(&spin), &(omega.cross(&omega.cross(&self.l)) + omega.cross(&slide) * 2.0));
+        if !v.is_empty() {
+            self.bias += turned(&body.hinge.kind.map_rate(q, v, &self.pose));
+        }
+        if let Some(motion) = &body.hinge.motion {
+            for i in 0..v.len() {
+                let [_, _, acceleration] = motion.sample(state.time, i);
+                self.prescribed[i] = acceleration;
+                self.bias += self.map[i] * acceleration;
+            }
+        }
+        let omega = omega + spin;
+        let mut motion = [0.0; 12];
+        motion[..9].copy_from_slice(rotation.as_slice());
+        motion[9..].copy_from_slice(omega.as_slice());
+        motion
+    }
+
+    /// Second pass: `P+` and `z+` from `P` and `z`.
+    pub fn filter(
+        &mut self,
+        system: &System,
+        state: &State,
+        inertia: &SpatialInertia,
+        force: &Vector6<f64>,
+    ) -> Result<(SpatialInertia, Vector6<f64>), Doubtful> {
+        let body = &system.bodies[self.body];
+        let m = body.hinge.kind.rate_count();
+        self.inertia.P_hinge = *inertia;
+        eliminate_hinge(body, &self.map, None, &mut self.inertia, |_| f64::INFINITY).map_err(|_| Doubtful)?;
+        let applied = &mut self.applied[..m];
+        body.hinge.applied_force(state.time, &state.position[body.position_range()], &state.velocity[body.velocity_range()], applied);
+        let left = self.inertia.P_plus;
+        if body.hinge.is_prescribed() {
+            return Ok((left, force + left.times(&self.bias)));
+        }
+        let mut z = *force;
+        for i in 0..m {
+            let epsilon = applied[i] - self.map[i].dot(force);
+            self.nu[i] = epsilon;
+            z += self.inertia.G[i] * epsilon;
+        }
+        solve_hinge(&self.inertia.D, &mut self.nu[..m]);
+        if matches!(body.hinge.kind, HingeKind::Free) {
+            // the hinge transmits what acts on its rates and nothing else
+            let felt = Vector6::from_iterator(applied.iter().copied());
+            return Ok((left, spatial(&(self.rotation * angular(&felt)), &(self.rotation * linear(&felt)))));
+        }
+        Ok((left, z + left.times(&self.bias)))
+    }
+
+    /// Third pass: the body's acceleration from that of O+ at O; writes the accelerations of the rates.
+    pub fn accelerate(&self, system: &System, outer: &Vector6<f64>, hinge: &mut [f64]) -> Vector6<f64> {
+        let mut alpha = outer + self.bias;
+        if system.bodies[self.body].hinge.is_prescribed() {
+            hinge.copy_from_slice(&self.prescribed[..hinge.len()]);
+            return alpha;
+        }
+        let biased = alpha;
+        for (i, out) in hinge.iter_mut().enumerate() {
+            *out = self.nu[i] - self.inertia.G[i].dot(&biased);
+            alpha += self.map[i] * *out;
+        }
+        alpha
+    }
+
+    /// Power (W) of motor and damper, or of the drive of a prescribed hinge.
+    pub fn power(&self, system: &System, state: &State, load: impl Fn(usize) -> Vector6<f64>) -> f64 {
+        let body = &system.bodies[self.body];
+        let (q, v) = (&state.position[body.position_range()], &state.velocity[body.velocity_range()]);
+        let along = if body.hinge.is_prescribed() {
+            // the drive does what the load along the hinge does, less what the hinge's spring stores
+            let load = load(self.body);
+            v.iter().enumerate().map(|(i, v)| self.pose.map[i].dot(&load) * v).sum::<f64>()
+        } else {
+            self.applied.iter().zip(v).map(|(f, v)| f * v).sum()
+        };
+        if body.hinge.stiffness.is_empty() {
+            return along;
+        }
+        along - body.hinge.spring_force(q).iter().zip(v).map(|(f, v)| f * v).sum::<f64>()
+    }
+}
+
+/// Velocities of all O in inertial axes (m/s).
+pub fn velocities(layout: &Layout, motion: &[Motion], general: &[GeneralHinge], out: &mut [Vector3<f64>]) {
+    for (k, link) in layout.links.iter().enumerate() {
+        let parent = motion.get(link.parent as usize);
+        let omega = parent.map_or_else(Vector3::zeros, |m| Vector3::new(m[9], m[10], m[11]));
+        let base = out.get(link.parent as usize).copied().unwrap_or_default();
+        let (l, slide) = if link.general == NONE {
+            let turn = parent.map_or_else(Matrix3::identity, |m| Matrix3::from_column_slice(&m[..9]));
+            (turn * Vector3::from(layout.shapes[link.shape as usize].offset), Vector3::zeros())
+        } else {
+            let own = &general[link.general as usize];
+            (own.l, linear(&own.relative))
+        };
+        out[k] = base + omega.cross(&l) + slide;
+    }
+}
+
+/// Force of the external loads on body `k` at O in inertial axes.
+pub fn external_force(system: &System, state: &State, k: usize, motion: &Motion, turn: &Matrix3<f64>) -> Vector6<f64> {
+    let rotation = Matrix3::from_column_slice(&motion[..9]) * turn.transpose();
+    let mut total = Vector6::zeros();
+    let first = system.loads.partition_point(|l| l.body < k);
+    for load in system.loads[first..].iter().take_while(|l| l.body == k) {
+        let value = load.value(state.time);
+        let axes = match load.axes {
+            LoadAxes::World => Matrix3::identity(),
+            LoadAxes::Body => rotation * system.bodies[k].frame_rotation,
+        };
+        let LoadPoint::Rigid(point) = &load.point else { continue };
+        total += force_from(&(rotation * point), &spatial(&(axes * angular(&value)), &(axes * linear(&value))));
+    }
+    total
+}

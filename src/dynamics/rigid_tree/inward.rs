@@ -1,0 +1,256 @@
+//! Second pass: articulated inertias and residual forces, from the tips to the base. Source: Paper Eq. 9 to 12, in inertial axes.
+
+use super::hinge::external_force;
+use super::layout::Shape;
+use super::{Arm, Branch, Doubtful, Gain, NONE, Outboard, RigidTree, angular_velocity, arm, attitude, parent_motion};
+use crate::dynamics::sweep::inertia_inward::SINGULAR;
+use crate::model::{State, System};
+use crate::spatial::SpatialInertia;
+use crate::spatial::lanes::Lanes;
+use crate::spatial::shift::spatial;
+use nalgebra::{Matrix3, Vector3, Vector6};
+
+/// Inertia `[[rotational, coupling], [coupling', translational]]` by columns, and residual force, in registers.
+#[derive(Clone, Copy)]
+pub struct Felt<V> {
+    pub rotational: [V; 3],
+    pub coupling: [V; 3],
+    /// Transpose of `coupling`.
+    pub coupled: [V; 3],
+    pub translational: [V; 3],
+    pub moment: V,
+    pub force: V,
+}
+
+/// Fills the gains, and what loads are made of.
+#[inline(always)]
+pub fn inward<L: Lanes>(s: L, tree: &mut RigidTree, system: &System, state: &State) -> Result<(), Doubtful> {
+    let RigidTree { layout, motion, gains, outboard, branches, general, external, .. } = tree;
+    for branch in branches.iter_mut() {
+        branch.felt = [0.0; 33];
+    }
+    let mut felt = Felt::none(s);
+    for (k, link) in layout.links.iter().enumerate().rev() {
+        let shape = &layout.shapes[link.shape as usize];
+        let (turn, omega) = (attitude(s, &motion[k]), angular_velocity(s, &motion[k]));
+        if let Some(branch) = branches.get(link.branch as usize) {
+            felt.add(s, branch);
+        }
+        felt.add_body(s, shape, turn, omega);
+        if let Some(load) = external.get_mut(link.load as usize) {
+            *load = external_force(system, state, k, &motion[k], &shape.turn);
+            felt.moment = s.sub(felt.moment, s.of_three([load[0], load[1], load[2]]));
+            felt.force = s.sub(felt.force, s.of_three([load[3], load[4], load[5]]));
+        }
+
+        let l = if link.general == NONE {
+            let (parent_turn, parent_omega) = parent_motion(s, link, motion);
+            let at = arm(s, shape, parent_turn, parent_omega, turn[2], state.velocity[link.v as usize]);
+            gains[k] = felt.pass_revolute(s, turn[2], link.applied(system, state, layout), &at)?;
+            at.l
+        } else {
+            let own = &mut general[link.general as usize];
+            let (inertia, force) = felt.plain(s);
+            let (inertia, force) = own.filter(system, state, &inertia, &force)?;
+            felt = Felt::of_plain(s, &inertia, &force);
+            s.of_three(own.l.into())
+        };
+        if let Some(out) = outboard.get_mut(k) {
+            *out = felt.record(s);
+        }
+        felt.shift(s, l);
+        if link.parent as usize + 1 != k || k == 0 {
+            if let Some(branch) = layout.links.get(link.parent as usize).and_then(|p| branches.get_mut(p.branch as usize)) {
+                felt.add(s, branch);
+                branch.felt = felt.compact(s);
+            }
+            felt = Felt::none(s);
+        }
+    }
+    Ok(())
+}
+
+impl<V: Copy> Felt<V> {
+    #[inline(always)]
+    fn none<L: Lanes<V = V>>(s: L) -> Self {
+        let zero = s.splat(0.0);
+        let block = [zero; 3];
+        Self { rotational: block, coupling: block, coupled: block, translational: block, moment: zero, force: zero }
+    }
+
+    /// Adds the body itself: its inertia about O, and what its motion asks for.
+    #[inline(always)]
+    fn add_body<L: Lanes<V = V>>(&mut self, s: L, shape: &Shape, turn: [V; 3], omega: V) {
+        let i = &shape.inertia;
+        // R I R'
+        let half: [V; 3] = [
+            s.combine_numbers(turn, [i[0], i[1], i[2]]),
+            s.combine_numbers(turn, [i[3], i[4], i[5]]),
+            s.combine_numbers(turn, [i[6], i[7], i[8]]),
+        ];
+        let own = [
+            s.combine_lanes(half, [s.all_x(turn[0]), s.all_x(turn[1]), s.all_x(turn[2])]),
+            s.combine_lanes(half, [s.all_y(turn[0]), s.all_y(turn[1]), s.all_y(turn[2])]),
+            s.combine_lanes(half, [s.all_z(turn[0]), s.all_z(turn[1]), s.all_z(turn[2])]),
+        ];
+        let first_moment = s.combine_numbers(turn, shape.first_moment);
+        self.moment = s.add(self.moment, s.cross(omega, s.combine(own, omega)));
+        self.force = s.add(self.force, s.cross(omega, s.cross(omega, first_moment)));
+        let [x, y, z] = s.three(first_moment);
+        let skew = [s.of_three([0.0, z, -y]), s.of_three([-z, 0.0, x]), s.of_three([y, -x, 0.0])];
+        let m = shape.mass;
+        let mass = [s.load([m, 0.0, 0.0, 0.0]), s.load([0.0, m, 0.0, 0.0]), s.load([0.0, 0.0, m, 0.0])];
+        for j in 0..3 {
+            self.rotational[j] = s.add(self.rotational[j], own[j]);
+            self.coupling[j] = s.add(self.coupling[j], skew[j]);
+            self.coupled[j] = s.sub(self.coupled[j], skew[j]);
+            self.translational[j] = s.add(self.translational[j], mass[j]);
+        }
+    }
+
+    /// Through a revolute hinge about `axis` with the torque `applied`: what is left is `P+` and `z+`.
+    #[inline(always)]
+    fn pass_revolute<L: Lanes<V = V>>(&mut self, s: L, axis: V, applied: f64, at: &Arm<V>) -> Result<Gain, Doubtful> {
+        // P H*, D and its inverse
+        let (angular, linear) = (s.combine(self.rotational, axis), s.combine(self.coupled, axis));
+        let pivot = s.dot(axis, angular);
+        let ([a, ..], [_, b, _], [_, _, c]) = (s.three(self.rotational[0]), s.three(self.rotational[1]), s.three(self.rotational[2]));
+        if !(pivot > SINGULAR * (a + b + c) && pivot >= f64::MIN_POSITIVE) {
+            return Err(Doubtful);
+        }
+        let inverse = 1.0 / pivot;
+        let nu = (applied - s.dot(axis, self.moment)) * inverse;
+        let (gain_angular, gain_linear) = (s.mul(angular, s.splat(inverse)), s.mul(linear, s.splat(inverse)));
+        // P+ = P - G D G*
+        let by_angular = [s.all_x(gain_angular), s.all_y(gain_angular), s.all_z(gain_angular)];
+        let by_linear = [s.all_x(gain_linear), s.all_y(gain_linear), s.all_z(gain_linear)];
+        for j in 0..3 {
+            self.rotational[j] = s.mul_take(angular, by_angular[j], self.rotational[j]);
+            self.coupled[j] = s.mul_take(linear, by_angular[j], self.coupled[j]);
+            self.coupling[j] = s.mul_take(angular, by_linear[j], self.coupling[j]);
+            self.translational[j] = s.mul_take(linear, by_linear[j], self.translational[j]);
+        }
+        // z+ = z + P+ a + P H* nu
+        let moment = s.combine_add(self.rotational, at.angular, s.mul_add(angular, s.splat(nu), self.moment));
+        let force = s.combine_add(self.coupled, at.angular, s.mul_add(linear, s.splat(nu), self.force));
+        self.moment = s.combine_add(self.coupling, at.linear, moment);
+        self.force = s.combine_add(self.translational, at.linear, force);
+        let ([gx, gy, gz], [fx, fy, fz]) = (s.three(gain_angular), s.three(gain_linear));
+        Ok([gx, gy, gz, fx, fy, fz, nu, 0.0])
+    }
+
+    /// From O to the origin of the parent, which lies at `-l`: `phi P phi*` and `phi z`.
+    #[inline(always)]
+    fn shift<L: Lanes<V = V>>(&mut self, s: L, l: V) {
+        let turned = [s.yzx(l), s.zxy(l)];
+        let lanes = [s.all_x(l), s.all_y(l), s.all_z(l)];
+        // A = C + l~ L, A' = C' - L l~, J + l~ C' - A l~
+        for j in 0..3 {
+            self.coupling[j] = s.add(self.coupling[j], across(s, turned, self.translational[j]));
+            self.rotational[j] = s.add(self.rotational[j], across(s, turned, self.coupled[j]));
+        }
+        self.coupled = take_right(s, self.translational, lanes, self.coupled);
+        self.rotational = take_right(s, self.coupling, lanes, self.rotational);
+        self.moment = s.add(self.moment, across(s, turned, self.force));
+    }
+
+    /// Adds what other children have left at `branch`.
+    #[inline(always)]
+    fn add<L: Lanes<V = V>>(&mut self, s: L, branch: &Branch) {
+        let f = &branch.felt;
+        for j in 0..3 {
+            let at = 3 * j;
+            self.rotational[j] = s.add(self.rotational[j], s.of_three([f[at], f[at + 1], f[at + 2]]));
+            self.coupling[j] = s.add(self.coupling[j], s.of_three([f[at + 9], f[at + 10], f[at + 11]]));
+            self.coupled[j] = s.add(self.coupled[j], s.of_three([f[j + 9], f[j + 12], f[j + 15]]));
+            self.translational[j] = s.add(self.translational[j], s.of_three([f[at + 18], f[at + 19], f[at + 20]]));
+        }
+        self.moment = s.add(self.moment, s.of_three([f[27], f[28], f[29]]));
+        self.force = s.add(self.force, s.of_three([f[30], f[31], f[32]]));
+    }
+
+    #[inline(always)]
+    fn compact<L: Lanes<V = V>>(&self, s: L) -> [f64; 33] {
+        let (mut compact, full) = ([0.0; 33], self.record(s));
+        compact.copy_from_slice(&full[..33]);
+        compact
+    }
+
+    /// In memory: three blocks by columns, moment, force.
+    #[inline(always)]
+    fn record<L: Lanes<V = V>>(&self, s: L) -> Outboard {
+        let mut out = [0.0; 36];
+        for j in 0..3 {
+            put(s, self.rotational[j], &mut out, 3 * j);
+        }
+        for j in 0..3 {
+            put(s, self.coupling[j], &mut out, 3 * j + 9);
+        }
+        for j in 0..3 {
+            put(s, self.translational[j], &mut out, 3 * j + 18);
+        }
+        put(s, self.moment, &mut out, 27);
+        put(s, self.force, &mut out, 30);
+        out
+    }
+
+    /// As the plain algebra of general hinges wants it.
+    #[inline(always)]
+    fn plain<L: Lanes<V = V>>(&self, s: L) -> (SpatialInertia, Vector6<f64>) {
+        plain(&self.record(s))
+    }
+
+    #[inline(always)]
+    fn of_plain<L: Lanes<V = V>>(s: L, inertia: &SpatialInertia, force: &Vector6<f64>) -> Self {
+        let branch = Branch { felt: numbers(inertia, force), acceleration: [0.0; 6] };
+        let mut felt = Self::none(s);
+        felt.add(s, &branch);
+        felt
+    }
+}
+
+/// Three numbers of a register to memory; what follows them is written later.
+#[inline(always)]
+fn put<L: Lanes>(s: L, a: L::V, out: &mut Outboard, at: usize) {
+    let x = s.store(a);
+    out[at] = x[0];
+    out[at + 1] = x[1];
+    out[at + 2] = x[2];
+    out[at + 3] = x[3];
+}
+
+/// `l x b` of an arm whose permutations (y, z, x) and (z, x, y) are at hand.
+#[inline(always)]
+fn across<L: Lanes>(s: L, l: [L::V; 2], b: L::V) -> L::V {
+    s.mul_take(l[1], s.yzx(b), s.mul(l[0], s.zxy(b)))
+}
+
+/// `to - block l~`.
+#[inline(always)]
+fn take_right<L: Lanes>(s: L, block: [L::V; 3], [x, y, z]: [L::V; 3], to: [L::V; 3]) -> [L::V; 3] {
+    [
+        s.mul_add(block[2], y, s.mul_take(block[1], z, to[0])),
+        s.mul_add(block[0], z, s.mul_take(block[2], x, to[1])),
+        s.mul_add(block[1], x, s.mul_take(block[0], y, to[2])),
+    ]
+}
+
+/// Inertia and force of a record.
+#[inline(never)]
+fn plain(f: &Outboard) -> (SpatialInertia, Vector6<f64>) {
+    let block = |at: usize| Matrix3::from_column_slice(&f[at..at + 9]);
+    let symmetric = |m: Matrix3<f64>| (m + m.transpose()) * 0.5;
+    let inertia = SpatialInertia { rotational: symmetric(block(0)), coupling: block(9), translational: symmetric(block(18)) };
+    (inertia, spatial(&Vector3::new(f[27], f[28], f[29]), &Vector3::new(f[30], f[31], f[32])))
+}
+
+/// The record of an inertia and force, without what fills it up.
+#[inline(never)]
+fn numbers(inertia: &SpatialInertia, force: &Vector6<f64>) -> [f64; 33] {
+    let mut out = [0.0; 33];
+    out[..9].copy_from_slice(inertia.rotational.as_slice());
+    out[9..18].copy_from_slice(inertia.coupling.as_slice());
+    out[18..27].copy_from_slice(inertia.translational.as_slice());
+    out[27..].copy_from_slice(force.as_slice());
+    out
+}

@@ -1,0 +1,234 @@
+//! What of a rigid tree stays the same, in the order and the size in which the passes want it.
+
+use crate::dynamics::sweep::graded::GradedInertia;
+use crate::model::{Body, BodyKind, HingeKind, State, System, TimeFunction};
+use nalgebra::{Matrix3, Vector3};
+use std::collections::HashMap;
+
+/// No index.
+pub const NONE: u32 = u32::MAX;
+
+/// Geometry and inertia of a body, shared by all that are alike to the last bit.
+#[derive(Debug, Clone, Copy)]
+pub struct Shape {
+    /// Columns: link axes with the hinge at zero to link axes of the parent.
+    pub fixed: [f64; 9],
+    /// O+ in link axes of the parent (m).
+    pub offset: [f64; 3],
+    /// First moment in link axes (kg m).
+    pub first_moment: [f64; 3],
+    /// kg.
+    pub mass: f64,
+    /// Rotational inertia about O in link axes (kg m^2), symmetric.
+    pub inertia: [f64; 9],
+    /// Link axes to O axes.
+    pub turn: Matrix3<f64>,
+}
+
+/// One body with its hinge.
+#[derive(Debug, Clone, Copy)]
+pub struct Link {
+    /// Body index of the parent, [`NONE`] for the world.
+    pub parent: u32,
+    /// Index of its [`Shape`].
+    pub shape: u32,
+    /// Index in `RigidTree::branches`, or [`NONE`].
+    pub branch: u32,
+    /// Index in `RigidTree::general`, [`NONE`] for a revolute hinge.
+    pub general: u32,
+    /// Index in [`Layout::drives`], or [`NONE`] for a revolute hinge with nothing but a constant torque.
+    pub drive: u32,
+    /// Index in [`Layout::loaded`], or [`NONE`].
+    pub load: u32,
+    /// First coordinate.
+    pub q: u32,
+    /// First rate.
+    pub v: u32,
+    /// Constant torque of a revolute hinge (N m).
+    pub torque: f64,
+}
+
+/// Spring, damper and motor of a revolute hinge.
+#[derive(Debug, Clone, Copy)]
+pub struct Drive {
+    /// N m/rad.
+    pub stiffness: f64,
+    /// N m s/rad.
+    pub damping: f64,
+    /// Angle at which the spring is at rest (rad).
+    pub rest: f64,
+    /// Body whose hinge has a torque that varies, or [`NONE`].
+    pub motor: u32,
+}
+
+/// All of it.
+#[derive(Debug, Clone)]
+pub struct Layout {
+    /// One per body.
+    pub links: Vec<Link>,
+    /// Every distinct shape.
+    pub shapes: Vec<Shape>,
+    /// Those of revolute hinges that have more than a constant torque.
+    pub drives: Vec<Drive>,
+    /// Bodies with a hinge of any other kind.
+    pub general: Vec<usize>,
+    /// Bodies with external loads.
+    pub loaded: Vec<usize>,
+    /// Number of bodies with a child that does not follow them.
+    pub branches: usize,
+}
+
+impl Layout {
+    /// Of `system`, if it is a tree of rigid bodies whose masses the plain recursion bears, and small enough for its indices.
+    pub fn new(system: &System) -> Option<Self> {
+        let rigid = system.bodies.iter().all(|b| matches!(b.kind, BodyKind::Rigid(_)));
+        let largest = system.position_count.max(system.velocity_count).max(system.bodies.len());
+        if !rigid || !system.closures.is_empty() || largest >= NONE as usize || GradedInertia::new(system).is_some() {
+            return None;
+        }
+        let mut layout =
+            Self { links: Vec::with_capacity(system.bodies.len()), shapes: vec![], drives: vec![], general: vec![], loaded: vec![], branches: 0 };
+        let mut known: HashMap<[u64; 34], u32> = HashMap::new();
+        for (k, body) in system.bodies.iter().enumerate() {
+            let parent_turn = body.parent.map_or_else(Matrix3::identity, |p| layout.shapes[layout.links[p].shape as usize].turn);
+            let shape = Shape::new(body, &parent_turn)?;
+            let shape = *known.entry(shape.bits()).or_insert_with(|| {
+                layout.shapes.push(shape);
+                index(layout.shapes.len() - 1)
+            });
+            let load = if system.loads.iter().any(|l| l.body == k) { push(&mut layout.loaded, k) } else { NONE };
+            let mut link = Link {
+                parent: body.parent.map_or(NONE, index),
+                shape,
+                branch: NONE,
+                general: NONE,
+                drive: NONE,
+                load,
+                q: index(body.position),
+                v: index(body.velocity),
+                torque: 0.0,
+            };
+            if revolute_axis(body).is_some() {
+                let (drive, torque) = drive_of(k, body);
+                link.torque = torque;
+                link.drive = drive.map_or(NONE, |d| push(&mut layout.drives, d));
+            } else {
+                link.general = push(&mut layout.general, k);
+            }
+            layout.links.push(link);
+            if let Some(parent) = body.parent.filter(|p| p + 1 != k) {
+                let slot = &mut layout.links[parent].branch;
+                if *slot == NONE {
+                    *slot = index(layout.branches);
+                    layout.branches += 1;
+                }
+            }
+        }
+        Some(layout)
+    }
+}
+
+/// Callers have made sure that it fits.
+fn index(i: usize) -> u32 {
+    u32::try_from(i).unwrap_or(NONE)
+}
+
+fn push<T>(list: &mut Vec<T>, item: T) -> u32 {
+    list.push(item);
+    index(list.len() - 1)
+}
+
+/// Axis of a revolute hinge that no function prescribes.
+fn revolute_axis(body: &Body) -> Option<&Vector3<f64>> {
+    match &body.hinge.kind {
+        HingeKind::Revolute { axis } if !body.hinge.is_prescribed() => Some(axis),
+        _ => None,
+    }
+}
+
+/// What acts on the revolute hinge of body `k`, and its constant torque (N m).
+fn drive_of(k: usize, body: &Body) -> (Option<Drive>, f64) {
+    let first = |list: &[f64]| list.first().copied().unwrap_or(0.0);
+    let hinge = &body.hinge;
+    let torque = match &hinge.torque {
+        Some(TimeFunction::Constant(values)) => Some(first(values)),
+        Some(_) => None,
+        None => Some(0.0),
+    };
+    let drive = Drive {
+        stiffness: first(&hinge.stiffness),
+        damping: first(&hinge.damping),
+        rest: first(&hinge.rest),
+        motor: if torque.is_some() { NONE } else { index(k) },
+    };
+    let needed = drive.stiffness != 0.0 || drive.damping != 0.0 || drive.motor != NONE;
+    (needed.then_some(drive), torque.unwrap_or(0.0))
+}
+
+/// A rotation that takes the third axis to `axis`; one that only changes places and signs if `axis` is a coordinate axis.
+fn turn_to(axis: &Vector3<f64>) -> Matrix3<f64> {
+    let (x, y, z) = (Vector3::x(), Vector3::y(), Vector3::z());
+    // the coordinate axis that is furthest from it is the first to be made normal to it
+    let other = match axis.iamin() {
+        0 => x,
+        1 => y,
+        _ => z,
+    };
+    if *axis == z {
+        return Matrix3::identity();
+    }
+    let first = other - axis * axis.dot(&other);
+    let first = first / first.norm();
+    Matrix3::from_columns(&[first, axis.cross(&first), *axis])
+}
+
+impl Shape {
+    fn new(body: &Body, parent_turn: &Matrix3<f64>) -> Option<Self> {
+        let BodyKind::Rigid(inertia) = &body.kind else { return None };
+        let turn = revolute_axis(body).map_or_else(Matrix3::identity, turn_to);
+        let side = &body.parent_side;
+        let outer = side.rotation * side.offset_rotation;
+        let position = side.position + side.rotation * side.offset;
+        let column = |m: Matrix3<f64>| -> [f64; 9] { std::array::from_fn(|i| m[i]) };
+        let rotational = turn.transpose() * inertia.rotational * turn;
+        Some(Self {
+            fixed: column(parent_turn.transpose() * outer * turn),
+            offset: parent_turn.tr_mul(&position).into(),
+            first_moment: turn.tr_mul(&inertia.first_moment()).into(),
+            mass: body.mass(),
+            inertia: column((rotational + rotational.transpose()) * 0.5),
+            turn,
+        })
+    }
+
+    fn bits(&self) -> [u64; 34] {
+        let numbers = self.fixed.iter().chain(&self.offset).chain(&self.first_moment).chain(&self.inertia);
+        let mut bits = [0; 34];
+        for (bit, number) in bits.iter_mut().zip(numbers.chain([&self.mass]).chain(self.turn.iter())) {
+            *bit = number.to_bits();
+        }
+        bits
+    }
+}
+
+impl Link {
+    /// Torque of the motor of a revolute hinge (N m).
+    #[inline]
+    pub fn motor(&self, system: &System, state: &State, layout: &Layout) -> f64 {
+        let varying = layout.drives.get(self.drive as usize).and_then(|d| system.bodies.get(d.motor as usize));
+        self.torque + varying.and_then(|b| b.hinge.torque.as_ref()).map_or(0.0, |f| f.value(state.time, 0))
+    }
+
+    /// Torque of motor, spring and damper of a revolute hinge (N m).
+    #[inline(always)]
+    pub fn applied(&self, system: &System, state: &State, layout: &Layout) -> f64 {
+        match layout.drives.get(self.drive as usize) {
+            None => self.torque,
+            Some(d) => {
+                let (q, v) = (state.position[self.q as usize], state.velocity[self.v as usize]);
+                let spring = if d.stiffness == 0.0 { 0.0 } else { d.stiffness * (q - d.rest) };
+                (self.motor(system, state, layout) - spring) - d.damping * v
+            }
+        }
+    }
+}

@@ -1,0 +1,206 @@
+//! Trees of rigid bodies, in one kernel: accelerations and hinge loads at a few nanoseconds per operation.
+//!
+//! The sweeps of [`super::sweep`] serve every system, closed and flexible; most of what they carry a rigid tree does not need. Here the
+//! recursion (Paper Eq. 8 to 13 and 18) runs in inertial axes, so that an articulated inertia is shifted from hinge to hinge and never
+//! turned, in three passes over records that lie in the order of the passes:
+//!
+//! | pass | leaves | numbers per body |
+//! |---|---|---|
+//! | [`outward`]: attitude and angular velocity | [`Motion`] | 12 |
+//! | [`inward`]: articulated inertias, residual forces | [`Gain`] | 8 |
+//! | the same, where loads are asked for | [`Outboard`] | 36 |
+//! | [`accelerate`]: accelerations and loads | the load, in place of the above | |
+//!
+//! What is cheaper to compute again than to fetch (the arm from the parent, the velocity terms) is not stored, so that long chains stay
+//! in the caches. Bodies that are alike share their constants. A child that follows its parent in the order, as in every chain, finds the
+//! parent's quantities in registers; only branching bodies keep theirs in memory.
+//!
+//! Axes: "link axes" are those of O, turned so that the axis of a revolute hinge is their third. Registers: [`crate::spatial::lanes`].
+
+mod accelerate;
+mod hinge;
+mod inward;
+mod layout;
+mod outward;
+
+use crate::model::{State, System};
+use crate::spatial::lanes::{Kernel, Lanes, Processor};
+use crate::spatial::shift::spatial;
+use hinge::GeneralHinge;
+use layout::{Layout, Link, NONE, Shape};
+use nalgebra::{Matrix3, Vector3, Vector6};
+
+/// Attitude (three columns: link axes to inertial axes) and angular velocity (inertial axes) of one body.
+pub(super) type Motion = [f64; 12];
+
+/// `G = P H* / D` (angular; linear) and `nu` of a revolute hinge, inertial axes at O.
+pub(super) type Gain = [f64; 8];
+
+/// `P+` (rotational, coupling, translational: nine numbers each, by columns) and `z+` at O in inertial axes; then the load in the first six.
+pub(super) type Outboard = [f64; 36];
+
+/// Quantities of a body that some child does not follow directly.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Branch {
+    /// What those children add to its inertia (three blocks by columns) and residual force.
+    pub felt: [f64; 33],
+    /// Its acceleration (angular; linear) at O in inertial axes.
+    pub acceleration: [f64; 6],
+}
+
+/// An evaluation that the kernel leaves to the sweeps: a hinge inertia at the edge of rounding, or a load that is no number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Doubtful;
+
+/// Kernel for one rigid tree, with room for one evaluation.
+#[derive(Debug, Clone)]
+pub struct RigidTree {
+    processor: Processor,
+    layout: Layout,
+    motion: Vec<Motion>,
+    gains: Vec<Gain>,
+    outboard: Vec<Outboard>,
+    branches: Vec<Branch>,
+    general: Vec<GeneralHinge>,
+    /// Velocity of O in inertial axes, for systems with loads.
+    velocity: Vec<Vector3<f64>>,
+    /// External force on the loaded bodies at O in inertial axes.
+    external: Vec<Vector6<f64>>,
+}
+
+impl RigidTree {
+    /// Room for `system`, if it is a tree of rigid bodies; `with_loads` if hinge loads will be asked for.
+    #[must_use]
+    pub fn new(system: &System, with_loads: bool) -> Option<Self> {
+        Self::on(Processor::detect(), system, with_loads)
+    }
+
+    /// The same with the instructions of `processor`.
+    #[must_use]
+    pub fn on(processor: Processor, system: &System, with_loads: bool) -> Option<Self> {
+        let layout = Layout::new(system)?;
+        let n = system.bodies.len();
+        Some(Self {
+            processor,
+            motion: vec![[0.0; 12]; n],
+            gains: vec![[0.0; 8]; n],
+            outboard: vec![[0.0; 36]; if with_loads { n } else { 0 }],
+            branches: vec![Branch { felt: [0.0; 33], acceleration: [0.0; 6] }; layout.branches],
+            general: layout.general.iter().map(|&body| GeneralHinge::new(body)).collect(),
+            velocity: vec![Vector3::zeros(); if system.loads.is_empty() { 0 } else { n }],
+            external: vec![Vector6::zeros(); layout.loaded.len()],
+            layout,
+        })
+    }
+
+    /// Accelerations of all hinge rates at `state`, into `hinge`.
+    pub(super) fn evaluate(&mut self, system: &System, state: &State, hinge: &mut [f64]) -> Result<(), Doubtful> {
+        self.processor.run(Evaluation { tree: self, system, state, hinge })
+    }
+
+    /// True if evaluations leave hinge loads.
+    #[must_use]
+    pub fn holds_loads(&self) -> bool {
+        !self.outboard.is_empty()
+    }
+
+    /// Load at the hinge of body `k` after the last evaluation: (moment N m about O; force N), by the parent on the child, O axes. Not a
+    /// number if loads were not asked for.
+    #[must_use]
+    pub fn hinge_load(&self, k: usize) -> Vector6<f64> {
+        let Some(load) = self.outboard.get(k) else { return Vector6::repeat(f64::NAN) };
+        let turn = self.hinge_axes(k).transpose();
+        spatial(&(turn * Vector3::new(load[0], load[1], load[2])), &(turn * Vector3::new(load[3], load[4], load[5])))
+    }
+
+    /// Power (W) of motors, dampers, prescribed motions and external loads at the last evaluation, at `state`.
+    #[must_use]
+    pub fn power(&self, system: &System, state: &State) -> f64 {
+        let mut total = 0.0;
+        for link in &self.layout.links {
+            if link.general != NONE {
+                total += self.general[link.general as usize].power(system, state, |k| self.hinge_load(k));
+            } else {
+                let v = state.velocity[link.v as usize];
+                let damping = self.layout.drives.get(link.drive as usize).map_or(0.0, |d| d.damping);
+                total += v * (link.motor(system, state, &self.layout) - damping * v);
+            }
+        }
+        for (&body, force) in self.layout.loaded.iter().zip(&self.external) {
+            let m = &self.motion[body];
+            total += force.dot(&spatial(&Vector3::new(m[9], m[10], m[11]), &self.velocity[body]));
+        }
+        total
+    }
+
+    /// O axes of body `k` to inertial axes.
+    fn hinge_axes(&self, k: usize) -> Matrix3<f64> {
+        Matrix3::from_column_slice(&self.motion[k][..9]) * self.layout.shapes[self.layout.links[k].shape as usize].turn.transpose()
+    }
+}
+
+/// One evaluation.
+struct Evaluation<'a> {
+    tree: &'a mut RigidTree,
+    system: &'a System,
+    state: &'a State,
+    hinge: &'a mut [f64],
+}
+
+impl Kernel for Evaluation<'_> {
+    type Output = Result<(), Doubtful>;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self, lanes: L) -> Result<(), Doubtful> {
+        let Self { tree, system, state, hinge } = self;
+        outward::outward(lanes, tree, system, state);
+        inward::inward(lanes, tree, system, state)?;
+        accelerate::accelerate(lanes, tree, system, state, hinge);
+        Ok(())
+    }
+}
+
+/// The attitude of one body in registers.
+#[inline(always)]
+fn attitude<L: Lanes>(s: L, m: &Motion) -> [L::V; 3] {
+    [s.load([m[0], m[1], m[2], m[3]]), s.load([m[3], m[4], m[5], m[6]]), s.load([m[6], m[7], m[8], m[9]])]
+}
+
+/// The angular velocity of one body in a register.
+#[inline(always)]
+fn angular_velocity<L: Lanes>(s: L, m: &Motion) -> L::V {
+    s.last_three([m[8], m[9], m[10], m[11]])
+}
+
+/// Attitude of the inertial frame.
+#[inline(always)]
+fn no_turn<L: Lanes>(s: L) -> [L::V; 3] {
+    [s.load([1.0, 0.0, 0.0, 0.0]), s.load([0.0, 1.0, 0.0, 0.0]), s.load([0.0, 0.0, 1.0, 0.0])]
+}
+
+/// What the motion of the parent makes of the hinge of a link with a revolute hinge.
+struct Arm<V> {
+    /// O of the parent to O of the link.
+    l: V,
+    /// Bias acceleration at O: angular.
+    angular: V,
+    /// Linear.
+    linear: V,
+}
+
+/// Arm and bias of a revolute hinge about `axis` that turns at `rate`.
+#[inline(always)]
+fn arm<L: Lanes>(s: L, shape: &Shape, parent: [L::V; 3], omega: L::V, axis: L::V, rate: f64) -> Arm<L::V> {
+    let l = s.combine_numbers(parent, shape.offset);
+    let angular = s.cross(omega, s.mul(axis, s.splat(rate)));
+    Arm { l, angular, linear: s.cross(omega, s.cross(omega, l)) }
+}
+
+/// Attitude and angular velocity of the parent of `link`.
+#[inline(always)]
+fn parent_motion<L: Lanes>(s: L, link: &Link, motion: &[Motion]) -> ([L::V; 3], L::V) {
+    match motion.get(link.parent as usize) {
+        Some(m) => (attitude(s, m), angular_velocity(s, m)),
+        None => (no_turn(s), s.splat(0.0)),
+    }
+}

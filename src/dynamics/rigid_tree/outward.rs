@@ -1,0 +1,52 @@
+//! First pass: attitude and angular velocity of every body, from the base to the tips. Source: Paper Eq. 8, in inertial axes.
+
+use super::layout::Shape;
+use super::{Motion, NONE, RigidTree, angular_velocity, attitude, no_turn, parent_motion};
+use crate::model::{State, System};
+use crate::spatial::lanes::Lanes;
+
+/// Fills the motions, and what general hinges make of them.
+#[inline(always)]
+pub fn outward<L: Lanes>(s: L, tree: &mut RigidTree, system: &System, state: &State) {
+    let RigidTree { layout, motion, general, velocity, .. } = tree;
+    let (mut last, mut turn, mut omega) = (NONE, no_turn(s), s.splat(0.0));
+    for (k, link) in layout.links.iter().enumerate() {
+        if link.parent != last {
+            (turn, omega) = parent_motion(s, link, motion);
+        }
+        let shape = &layout.shapes[link.shape as usize];
+        if link.general == NONE {
+            let (q, v) = (state.position[link.q as usize], state.velocity[link.v as usize]);
+            turn = turned(s, shape, turn, q);
+            omega = s.mul_add(turn[2], s.splat(v), omega);
+            motion[k] = record(s, turn, omega);
+        } else {
+            let own = &mut general[link.general as usize];
+            let parent = motion.get(link.parent as usize).copied();
+            motion[k] = own.follow(system, state, shape, parent.as_ref());
+            (turn, omega) = (attitude(s, &motion[k]), angular_velocity(s, &motion[k]));
+        }
+        last = u32::try_from(k).unwrap_or(NONE);
+    }
+    if !velocity.is_empty() {
+        super::hinge::velocities(layout, motion, general, velocity);
+    }
+}
+
+/// Attitude past a revolute hinge at the angle `q` (rad).
+#[inline(always)]
+fn turned<L: Lanes>(s: L, shape: &Shape, parent: [L::V; 3], q: f64) -> [L::V; 3] {
+    let f = &shape.fixed;
+    let x = s.combine_numbers(parent, [f[0], f[1], f[2]]);
+    let y = s.combine_numbers(parent, [f[3], f[4], f[5]]);
+    let z = s.combine_numbers(parent, [f[6], f[7], f[8]]);
+    let (sine, cosine) = q.sin_cos();
+    let (sine, cosine) = (s.splat(sine), s.splat(cosine));
+    [s.mul_add(x, cosine, s.mul(y, sine)), s.mul_take(x, sine, s.mul(y, cosine)), z]
+}
+
+#[inline(always)]
+fn record<L: Lanes>(s: L, turn: [L::V; 3], omega: L::V) -> Motion {
+    let (a, b, c, w) = (s.three(turn[0]), s.three(turn[1]), s.three(turn[2]), s.three(omega));
+    [a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2], w[0], w[1], w[2]]
+}
