@@ -46,6 +46,9 @@ pub trait Lanes: Copy {
         self.load([x[1], x[2], x[3], 0.0])
     }
 
+    /// The sums of the first three numbers of three registers.
+    fn sums(self, a: [Self::V; 3]) -> Self::V;
+
     /// `[x, y, z]`.
     #[inline(always)]
     fn three(self, a: Self::V) -> [f64; 3] {
@@ -189,6 +192,11 @@ impl Lanes for Plain {
     fn all_z(self, a: [f64; 4]) -> [f64; 4] {
         [a[2]; 4]
     }
+
+    #[inline(always)]
+    fn sums(self, [a, b, c]: [[f64; 4]; 3]) -> [f64; 4] {
+        [(a[0] + a[1]) + a[2], (b[0] + b[1]) + b[2], (c[0] + c[1]) + c[2], 0.0]
+    }
 }
 
 /// AVX2 and FMA.
@@ -268,6 +276,19 @@ impl Lanes for Wide {
     #[inline(always)]
     fn all_z(self, a: pulp::f64x4) -> pulp::f64x4 {
         pulp::cast(self.avx2._mm256_permute4x64_pd::<0b10_10_10_10>(pulp::cast(a)))
+    }
+
+    #[inline(always)]
+    fn sums(self, [a, b, c]: [pulp::f64x4; 3]) -> pulp::f64x4 {
+        // (ax, bx, az, bz) and (ay, by, .., ..), then the halves that hold c
+        let (low, high) =
+            (self.avx._mm256_unpacklo_pd(pulp::cast(a), pulp::cast(b)), self.avx._mm256_unpackhi_pd(pulp::cast(a), pulp::cast(b)));
+        let (c_low, c_high): (core::arch::x86_64::__m256d, core::arch::x86_64::__m256d) =
+            (pulp::cast(c), pulp::cast(self.avx._mm256_permute_pd::<0b0101>(pulp::cast(c))));
+        let x = self.avx._mm256_permute2f128_pd::<0x20>(low, c_low);
+        let y = self.avx._mm256_permute2f128_pd::<0x20>(high, c_high);
+        let z = self.avx._mm256_permute2f128_pd::<0x31>(low, c_low);
+        self.add(self.add(pulp::cast(x), pulp::cast(y)), pulp::cast(z))
     }
 
     #[inline(always)]

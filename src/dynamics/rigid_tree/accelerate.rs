@@ -64,15 +64,12 @@ fn write_load<L: Lanes>(s: L, out: &mut Outboard, angular: L::V, linear: L::V) {
     let rotational = [column(s, out, 0), column(s, out, 3), column(s, out, 6)];
     let coupling = [column(s, out, 9), column(s, out, 12), column(s, out, 15)];
     let translational = [column(s, out, 18), column(s, out, 21), column(s, out, 24)];
-    let moment = s.combine_add(coupling, linear, s.combine_add(rotational, angular, column(s, out, 27)));
-    let force = s.three(s.combine_add(translational, linear, column(s, out, 30)));
-    let moment = s.three(moment);
-    // C' alpha: the columns of C on the angular acceleration
-    let by_coupling = [s.dot(coupling[0], angular), s.dot(coupling[1], angular), s.dot(coupling[2], angular)];
-    for i in 0..3 {
-        out[i] = moment[i];
-        out[i + 3] = force[i] + by_coupling[i];
-    }
+    let turned = [s.mul(coupling[0], angular), s.mul(coupling[1], angular), s.mul(coupling[2], angular)];
+    let moving = [s.all_x(linear), s.all_y(linear), s.all_z(linear)];
+    let moment = s.add(s.combine_add(rotational, angular, column(s, out, 27)), s.combine_lanes(coupling, moving));
+    let force = s.add(s.combine_lanes(translational, moving), s.add(column(s, out, 30), s.sums(turned)));
+    let (moment, force) = (s.three(moment), s.three(force));
+    *out.first_chunk_mut().unwrap_or(&mut [0.0; 6]) = [moment[0], moment[1], moment[2], force[0], force[1], force[2]];
 }
 
 #[inline(always)]

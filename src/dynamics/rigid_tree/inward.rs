@@ -2,7 +2,7 @@
 
 use super::hinge::external_force;
 use super::layout::Shape;
-use super::{Arm, Branch, Doubtful, Gain, NONE, Outboard, RigidTree, angular_velocity, arm, attitude, parent_motion};
+use super::{Arm, Doubtful, Gain, NONE, Outboard, RECORD, RigidTree, angular_velocity, arm, attitude, parent_motion};
 use crate::dynamics::sweep::inertia_inward::SINGULAR;
 use crate::model::{State, System};
 use crate::spatial::SpatialInertia;
@@ -27,14 +27,14 @@ pub struct Felt<V> {
 pub fn inward<L: Lanes>(s: L, tree: &mut RigidTree, system: &System, state: &State) -> Result<(), Doubtful> {
     let RigidTree { layout, motion, gains, outboard, branches, general, external, .. } = tree;
     for branch in branches.iter_mut() {
-        branch.felt = [0.0; 33];
+        branch.felt = [0.0; RECORD];
     }
     let mut felt = Felt::none(s);
     for (k, link) in layout.links.iter().enumerate().rev() {
         let shape = &layout.shapes[link.shape as usize];
         let (turn, omega) = (attitude(s, &motion[k]), angular_velocity(s, &motion[k]));
         if let Some(branch) = branches.get(link.branch as usize) {
-            felt.add(s, branch);
+            felt.add(s, &branch.felt);
         }
         felt.add_body(s, shape, turn, omega);
         if let Some(load) = external.get_mut(link.load as usize) {
@@ -56,13 +56,13 @@ pub fn inward<L: Lanes>(s: L, tree: &mut RigidTree, system: &System, state: &Sta
             s.of_three(own.l.into())
         };
         if let Some(out) = outboard.get_mut(k) {
-            *out = felt.record(s);
+            felt.write(s, out);
         }
         felt.shift(s, l);
         if link.parent as usize + 1 != k || k == 0 {
             if let Some(branch) = layout.links.get(link.parent as usize).and_then(|p| branches.get_mut(p.branch as usize)) {
-                felt.add(s, branch);
-                branch.felt = felt.compact(s);
+                felt.add(s, &branch.felt);
+                felt.write(s, &mut branch.felt);
             }
             felt = Felt::none(s);
         }
@@ -154,59 +154,55 @@ impl<V: Copy> Felt<V> {
         self.moment = s.add(self.moment, across(s, turned, self.force));
     }
 
-    /// Adds what other children have left at `branch`.
+    /// Adds what a record holds.
     #[inline(always)]
-    fn add<L: Lanes<V = V>>(&mut self, s: L, branch: &Branch) {
-        let f = &branch.felt;
+    fn add<L: Lanes<V = V>>(&mut self, s: L, f: &Outboard) {
         for j in 0..3 {
-            let at = 3 * j;
-            self.rotational[j] = s.add(self.rotational[j], s.of_three([f[at], f[at + 1], f[at + 2]]));
-            self.coupling[j] = s.add(self.coupling[j], s.of_three([f[at + 9], f[at + 10], f[at + 11]]));
+            self.rotational[j] = s.add(self.rotational[j], get(s, f, 3 * j));
+            self.coupling[j] = s.add(self.coupling[j], get(s, f, 3 * j + 9));
             self.coupled[j] = s.add(self.coupled[j], s.of_three([f[j + 9], f[j + 12], f[j + 15]]));
-            self.translational[j] = s.add(self.translational[j], s.of_three([f[at + 18], f[at + 19], f[at + 20]]));
+            self.translational[j] = s.add(self.translational[j], get(s, f, 3 * j + 18));
         }
-        self.moment = s.add(self.moment, s.of_three([f[27], f[28], f[29]]));
-        self.force = s.add(self.force, s.of_three([f[30], f[31], f[32]]));
+        self.moment = s.add(self.moment, get(s, f, 27));
+        self.force = s.add(self.force, get(s, f, 30));
     }
 
+    /// To memory: three blocks by columns, moment, force.
     #[inline(always)]
-    fn compact<L: Lanes<V = V>>(&self, s: L) -> [f64; 33] {
-        let (mut compact, full) = ([0.0; 33], self.record(s));
-        compact.copy_from_slice(&full[..33]);
-        compact
-    }
-
-    /// In memory: three blocks by columns, moment, force.
-    #[inline(always)]
-    fn record<L: Lanes<V = V>>(&self, s: L) -> Outboard {
-        let mut out = [0.0; 36];
+    fn write<L: Lanes<V = V>>(&self, s: L, out: &mut Outboard) {
         for j in 0..3 {
-            put(s, self.rotational[j], &mut out, 3 * j);
+            put(s, self.rotational[j], out, 3 * j);
         }
         for j in 0..3 {
-            put(s, self.coupling[j], &mut out, 3 * j + 9);
+            put(s, self.coupling[j], out, 3 * j + 9);
         }
         for j in 0..3 {
-            put(s, self.translational[j], &mut out, 3 * j + 18);
+            put(s, self.translational[j], out, 3 * j + 18);
         }
-        put(s, self.moment, &mut out, 27);
-        put(s, self.force, &mut out, 30);
-        out
+        put(s, self.moment, out, 27);
+        put(s, self.force, out, 30);
     }
 
     /// As the plain algebra of general hinges wants it.
     #[inline(always)]
     fn plain<L: Lanes<V = V>>(&self, s: L) -> (SpatialInertia, Vector6<f64>) {
-        plain(&self.record(s))
+        let mut record = [0.0; RECORD];
+        self.write(s, &mut record);
+        plain(&record)
     }
 
     #[inline(always)]
     fn of_plain<L: Lanes<V = V>>(s: L, inertia: &SpatialInertia, force: &Vector6<f64>) -> Self {
-        let branch = Branch { felt: numbers(inertia, force), acceleration: [0.0; 6] };
         let mut felt = Self::none(s);
-        felt.add(s, &branch);
+        felt.add(s, &numbers(inertia, force));
         felt
     }
+}
+
+/// Three numbers of memory to a register.
+#[inline(always)]
+fn get<L: Lanes>(s: L, f: &Outboard, at: usize) -> L::V {
+    s.load([f[at], f[at + 1], f[at + 2], f[at + 3]])
 }
 
 /// Three numbers of a register to memory; what follows them is written later.
@@ -244,13 +240,13 @@ fn plain(f: &Outboard) -> (SpatialInertia, Vector6<f64>) {
     (inertia, spatial(&Vector3::new(f[27], f[28], f[29]), &Vector3::new(f[30], f[31], f[32])))
 }
 
-/// The record of an inertia and force, without what fills it up.
+/// The record of an inertia and force.
 #[inline(never)]
-fn numbers(inertia: &SpatialInertia, force: &Vector6<f64>) -> [f64; 33] {
-    let mut out = [0.0; 33];
+fn numbers(inertia: &SpatialInertia, force: &Vector6<f64>) -> Outboard {
+    let mut out = [0.0; RECORD];
     out[..9].copy_from_slice(inertia.rotational.as_slice());
     out[9..18].copy_from_slice(inertia.coupling.as_slice());
     out[18..27].copy_from_slice(inertia.translational.as_slice());
-    out[27..].copy_from_slice(force.as_slice());
+    out[27..33].copy_from_slice(force.as_slice());
     out
 }

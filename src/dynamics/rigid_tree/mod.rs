@@ -36,14 +36,17 @@ pub(super) type Motion = [f64; 12];
 /// `G = P H* / D` (angular; linear) and `nu` of a revolute hinge, inertial axes at O.
 pub(super) type Gain = [f64; 8];
 
+/// Numbers of an [`Outboard`]; the last three fill up.
+const RECORD: usize = 36;
+
 /// `P+` (rotational, coupling, translational: nine numbers each, by columns) and `z+` at O in inertial axes; then the load in the first six.
-pub(super) type Outboard = [f64; 36];
+pub(super) type Outboard = [f64; RECORD];
 
 /// Quantities of a body that some child does not follow directly.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Branch {
-    /// What those children add to its inertia (three blocks by columns) and residual force.
-    pub felt: [f64; 33],
+    /// What those children add to its inertia and residual force.
+    pub felt: Outboard,
     /// Its acceleration (angular; linear) at O in inertial axes.
     pub acceleration: [f64; 6],
 }
@@ -84,8 +87,8 @@ impl RigidTree {
             processor,
             motion: vec![[0.0; 12]; n],
             gains: vec![[0.0; 8]; n],
-            outboard: vec![[0.0; 36]; if with_loads { n } else { 0 }],
-            branches: vec![Branch { felt: [0.0; 33], acceleration: [0.0; 6] }; layout.branches],
+            outboard: vec![[0.0; RECORD]; if with_loads { n } else { 0 }],
+            branches: vec![Branch { felt: [0.0; RECORD], acceleration: [0.0; 6] }; layout.branches],
             general: layout.general.iter().map(|&body| GeneralHinge::new(body)).collect(),
             velocity: vec![Vector3::zeros(); if system.loads.is_empty() { 0 } else { n }],
             external: vec![Vector6::zeros(); layout.loaded.len()],
