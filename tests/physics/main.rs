@@ -11,6 +11,7 @@ mod first_principles;
 mod identities;
 mod loop_cost;
 mod loop_runs;
+mod modal_cost;
 mod nodal_sums;
 mod published;
 mod published_flexible;
