@@ -51,15 +51,16 @@ pub mod hinge_load;
 pub mod inverse;
 pub mod modal_block;
 pub mod profile;
-pub mod rigid_tree;
+pub mod kernel;
 pub mod sweep;
 pub mod world;
 
 use crate::model::{Body, ClosureMethod, State, System, hinge};
 use closed_chain::ClosedChain;
 use crate::spatial::lanes::Processor;
-use nalgebra::Vector6;
-use rigid_tree::RigidTree;
+use crate::spatial::shift::angular;
+use nalgebra::{Vector3, Vector6};
+use kernel::TreeKernel;
 use sweep::acceleration_outward::AccelerationScratch;
 use sweep::force_inward::ForceScratch;
 use sweep::inertia_inward::InertiaScratch;
@@ -257,8 +258,8 @@ pub struct Workspace {
     pub acceleration: AccelerationScratch,
     /// Closures; none for a tree.
     pub closed: Option<Box<ClosedChain>>,
-    /// Kernel for trees of rigid bodies; none for other systems.
-    rigid: Option<Box<RigidTree>>,
+    /// Kernel for trees; none for other systems.
+    tree: Option<Box<TreeKernel>>,
     /// True if the last evaluation was the kernel's, so that the sweeps hold nothing of it but the accelerations of the hinges.
     by_kernel: bool,
 }
@@ -267,22 +268,22 @@ impl Workspace {
     /// Room for evaluations of `system`.
     #[must_use]
     pub fn new(system: &System) -> Self {
-        Self::with(system, RigidTree::new(system, true))
+        Self::with(system, TreeKernel::new(system, true))
     }
 
-    /// The same for evaluations whose hinge loads nobody asks for: [`accelerations`] of a tree of rigid bodies then leave none.
+    /// The same for evaluations whose hinge loads nobody asks for: [`accelerations`] of a tree then leave none.
     #[must_use]
     pub fn without_loads(system: &System) -> Self {
-        Self::with(system, RigidTree::new(system, false))
+        Self::with(system, TreeKernel::new(system, false))
     }
 
     /// The same as [`Self::new`] with the instructions of `processor`.
     #[must_use]
     pub fn on(processor: Processor, system: &System) -> Self {
-        Self::with(system, RigidTree::on(processor, system, true))
+        Self::with(system, TreeKernel::on(processor, system, true))
     }
 
-    fn with(system: &System, rigid: Option<RigidTree>) -> Self {
+    fn with(system: &System, tree: Option<TreeKernel>) -> Self {
         Self {
             pose: PoseScratch::new(system),
             velocity: VelocityScratch::new(system),
@@ -290,20 +291,38 @@ impl Workspace {
             force: ForceScratch::new(system),
             acceleration: AccelerationScratch::new(system),
             closed: ClosedChain::new(system),
-            rigid: rigid.map(Box::new),
+            tree: tree.map(Box::new),
             by_kernel: false,
         }
     }
 
-    /// True if the last evaluation was that of the kernel for rigid trees.
+    /// Angular velocity (rad/s) and acceleration (angular; linear, less gravity) of frame B of flexible body `k` at the last evaluation, in
+    /// B axes.
+    #[must_use]
+    pub fn frame_motion(&self, k: usize) -> (Vector3<f64>, Vector6<f64>) {
+        self.kernel()
+            .and_then(|tree| tree.frame_motion(k))
+            .unwrap_or_else(|| (angular(&self.velocity.bodies[k].V), self.acceleration.alpha[k]))
+    }
+
+    /// Trace of the rotational inertia (kg m^2) of flexible body `k` about B at the last evaluation; none if it does not change or `k` is rigid.
+    #[must_use]
+    pub fn inertia_trace(&self, k: usize) -> Option<f64> {
+        match self.kernel() {
+            Some(tree) => tree.inertia_trace(k),
+            None => self.pose.bodies[k].flexible.map(|index| self.pose.flexible[index].inertia.inertia.trace()),
+        }
+    }
+
+    /// True if the last evaluation was that of the kernel for trees.
     #[must_use]
     pub fn is_by_kernel(&self) -> bool {
         self.by_kernel
     }
 
-    /// The kernel of a tree of rigid bodies, if the last evaluation was its.
-    fn kernel(&self) -> Option<&RigidTree> {
-        self.rigid.as_deref().filter(|_| self.by_kernel)
+    /// The kernel of a tree, if the last evaluation was its.
+    fn kernel(&self) -> Option<&TreeKernel> {
+        self.tree.as_deref().filter(|_| self.by_kernel)
     }
 
     /// Load of closure `index` at the last evaluation: on b at b's point, in a's axes; zero for a gear.
@@ -353,16 +372,16 @@ impl Workspace {
 
 /// Accelerations of all hinge and modal coordinates at `state`, left in `workspace.acceleration`, and hinge loads: what a step needs.
 ///
-/// Like [`forward_dynamics`], but for trees of rigid bodies by a kernel of their own ([`rigid_tree`]), several times as fast. It leaves
+/// Like [`forward_dynamics`], but for trees by a kernel of their own ([`kernel`]), several times as fast. It leaves
 /// nothing else: poses, velocities, inertias and forces in `workspace` are then those of an earlier evaluation.
 ///
 /// # Errors
 /// As [`forward_dynamics`].
 pub fn accelerations(system: &System, state: &State, workspace: &mut Workspace) -> Result<(), DynamicsError> {
-    if let Some(tree) = &mut workspace.rigid {
-        let done = tree.evaluate(system, state, &mut workspace.acceleration.hinge);
+    if let Some(tree) = &mut workspace.tree {
+        let done = tree.evaluate(system, state, &mut workspace.acceleration.hinge, &mut workspace.acceleration.modal);
         // what is doubtful is for the sweeps to judge, which look closer and name what is wrong
-        if done.is_ok() && workspace.acceleration.hinge.iter().fold(true, |finite, x| finite & x.is_finite()) {
+        if done.is_ok() && workspace.acceleration.is_finite() {
             workspace.by_kernel = true;
             return Ok(());
         }
@@ -395,10 +414,10 @@ pub fn forward_dynamics(system: &System, state: &State, workspace: &mut Workspac
 
 /// Refuses accelerations that are no numbers: products of finite numbers may overflow.
 fn check_finite(system: &System, acceleration: &AccelerationScratch) -> Result<(), DynamicsError> {
-    let all = |x: &[f64]| x.iter().fold(true, |finite, x| finite & x.is_finite());
-    if all(&acceleration.hinge) && all(&acceleration.modal) {
+    if acceleration.is_finite() {
         return Ok(());
     }
+    let all = |x: &[f64]| x.iter().all(|x| x.is_finite());
     let first = |body: &&Body| !(all(&acceleration.hinge[body.velocity_range()]) && all(&acceleration.modal[body.modal_range()]));
     let place = system.bodies.iter().find(first).map_or_else(String::new, |body| {
         if all(&acceleration.hinge[body.velocity_range()]) {

@@ -453,12 +453,9 @@ fn opened(system: &System, workspace: &Workspace, time: f64) -> RunFailure {
 
 /// True if the last evaluation saw a body deformed to a thousand times its size (a million in inertia): only a diverging motion does that.
 fn is_torn_apart(chart: &Chart<'_>) -> bool {
-    chart.system.bodies.iter().zip(&chart.workspace.pose.bodies).any(|(body, pose)| match (body.flexible(), pose.flexible) {
-        (Some(flexible), Some(index)) => {
-            let undeformed = 2.0 * flexible.integrals.second_moment.trace();
-            chart.workspace.pose.flexible[index].inertia.inertia.trace().abs() > 1e6 * undeformed
-        }
-        _ => false,
+    chart.system.bodies.iter().enumerate().any(|(k, body)| {
+        let undeformed = body.flexible().map_or(f64::INFINITY, |f| 2.0 * f.integrals.second_moment.trace());
+        chart.workspace.inertia_trace(k).is_some_and(|trace| trace.abs() > 1e6 * undeformed)
     })
 }
 

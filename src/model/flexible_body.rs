@@ -233,6 +233,16 @@ impl FlexibleBody {
         }
     }
 
+    /// The same on mode `j` alone.
+    #[must_use]
+    pub fn elastic_force_on(&self, j: usize, eta: &[f64], eta_dot: &[f64]) -> f64 {
+        let spring = match &self.full_stiffness {
+            None => self.stiffness[j] * eta[j],
+            Some(full) => full.row(j).iter().zip(eta).map(|(k, e)| k * e).sum::<f64>(),
+        };
+        self.damping[j] * eta_dot[j] + spring
+    }
+
     /// Strain energy (J) at the modal coordinates `eta`.
     #[must_use]
     pub fn strain_energy(&self, eta: &[f64]) -> f64 {

@@ -58,8 +58,8 @@ impl StiffeningGauge {
         for followed in &mut self.bodies {
             let k = followed.body;
             let Some(flexible) = sample.system.bodies[k].flexible() else { continue };
-            let omega = angular(&sample.workspace.velocity.bodies[k].V);
-            let load = inertial_load(&omega, &sample.workspace.acceleration.alpha[k]);
+            let (omega, alpha) = sample.workspace.frame_motion(k);
+            let load = inertial_load(&omega, &alpha);
             for (j, stiffness) in flexible.stiffness.iter().enumerate() {
                 if flexible.order >= InertiaOrder::First {
                     followed.softening.raise(softening(flexible, j, &omega) / stiffness, j, sample.state.time);

@@ -74,7 +74,7 @@ fn assert_conserved(name: &str, recipe: &Recipe, seeds: &[u64], momenta: bool) {
 }
 
 #[test]
-fn free_rigid_trees_conserve_energy_and_momenta_to_the_order_of_the_steps() {
+fn free_kernels_conserve_energy_and_momenta_to_the_order_of_the_steps() {
     assert_conserved("rigid", &Recipe { flexible: 0.0, ..free_recipe() }, &[10, 11, 12, 13, 14, 15, 16], true);
 }
 

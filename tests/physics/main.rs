@@ -17,7 +17,7 @@ mod published;
 mod published_flexible;
 mod published_loops;
 mod reference_solver;
-mod rigid_kernel;
+mod kernel;
 mod rotating;
 mod scaling;
 mod stiff;

@@ -39,6 +39,12 @@ impl AccelerationScratch {
             aggregates: system.aggregates.iter().map(AggregateAcceleration::new).collect(),
         }
     }
+
+    /// True if the accelerations of all coordinates are numbers.
+    #[must_use]
+    pub fn is_finite(&self) -> bool {
+        self.hinge.iter().chain(&self.modal).fold(true, |finite, x| finite & x.is_finite())
+    }
 }
 
 /// Fills `out` from the earlier sweeps.

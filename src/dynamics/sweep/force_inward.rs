@@ -282,7 +282,7 @@ fn apply_loads(system: &System, state: &State, pose: &PoseScratch, out: &mut For
 }
 
 /// Present point of a load (m) in the recursion's frame of its body, and the mode shape there.
-fn load_shape(load: &Load, eta: &[f64], shape: &mut [Vector6<f64>]) -> Vector3<f64> {
+pub(in crate::dynamics) fn load_shape(load: &Load, eta: &[f64], shape: &mut [Vector6<f64>]) -> Vector3<f64> {
     match &load.point {
         LoadPoint::Rigid(point) => *point,
         LoadPoint::Interface(attachment) => {

@@ -1,6 +1,6 @@
 //! Third pass: accelerations and hinge loads, from the base to the tips. Source: Paper Eq. 13 and 18, in inertial axes.
 
-use super::{Branch, NONE, Outboard, RigidTree, arm, parent_motion};
+use super::{Branch, NONE, Outboard, TreeKernel, arm, parent_motion};
 use crate::dynamics::sweep::force_inward::world_acceleration;
 use crate::model::{State, System};
 use crate::spatial::lanes::Lanes;
@@ -9,14 +9,17 @@ use nalgebra::Vector3;
 
 /// Fills `hinge` with the accelerations of the hinge rates, and the loads where there is room for them.
 #[inline(always)]
-pub fn accelerate<L: Lanes>(s: L, tree: &mut RigidTree, system: &System, state: &State, hinge: &mut [f64]) {
-    let RigidTree { layout, motion, gains, outboard, branches, general, .. } = tree;
+pub fn accelerate<L: Lanes>(s: L, tree: &mut TreeKernel, system: &System, state: &State, hinge: &mut [f64], modal: &mut [f64]) {
+    let TreeKernel { layout, motion, gains, outboard, branches, general, flexible, modal_shapes, .. } = tree;
     let world = world_acceleration(system);
     let at_world = (s.of_three([world[0], world[1], world[2]]), s.of_three([world[3], world[4], world[5]]));
     let mut last = NONE;
     let (mut angular, mut linear) = at_world;
     for (k, link) in layout.links.iter().enumerate() {
-        if link.parent != last {
+        if let Some(&(body, tip)) = layout.tips.get(link.tip as usize) {
+            let a = &flexible[body as usize].tips[tip as usize].acceleration;
+            (angular, linear) = (s.of_three([a[0], a[1], a[2]]), s.of_three([a[3], a[4], a[5]]));
+        } else if link.parent != last {
             (angular, linear) = match layout.links.get(link.parent as usize).and_then(|p| branches.get(p.branch as usize)) {
                 Some(Branch { acceleration: a, .. }) => (s.of_three([a[0], a[1], a[2]]), s.of_three([a[3], a[4], a[5]])),
                 None => at_world,
@@ -24,7 +27,7 @@ pub fn accelerate<L: Lanes>(s: L, tree: &mut RigidTree, system: &System, state: 
         }
         if link.general == NONE {
             let shape = &layout.shapes[link.shape as usize];
-            let (turn, omega) = parent_motion(s, link, motion);
+            let (turn, omega) = parent_motion(s, link, layout, motion, flexible);
             let m = &motion[k];
             let axis = s.load([m[6], m[7], m[8], m[9]]);
             let at = arm(s, shape, turn, omega, axis, state.velocity[link.v as usize]);
@@ -49,6 +52,11 @@ pub fn accelerate<L: Lanes>(s: L, tree: &mut RigidTree, system: &System, state: 
             let outer = spatial(&Vector3::from(s.three(angular)), &Vector3::from(s.three(linear)));
             let alpha = own.accelerate(system, &outer, &mut hinge[rates]);
             (angular, linear) = (s.of_three([alpha[0], alpha[1], alpha[2]]), s.of_three([alpha[3], alpha[4], alpha[5]]));
+        }
+        if let Some(own) = flexible.get_mut(link.flexible as usize) {
+            let constants = &modal_shapes[own.shape];
+            let outer = spatial(&Vector3::from(s.three(angular)), &Vector3::from(s.three(linear)));
+            own.accelerate(s, constants, &outer, &mut modal[system.bodies[k].modal_range()]);
         }
         if let Some(branch) = branches.get_mut(link.branch as usize) {
             let (a, b) = (s.three(angular), s.three(linear));

@@ -1,7 +1,8 @@
 //! Hinges that are not plain revolute ones, prescribed ones, and external loads: in plain algebra, inertial axes.
 
 use super::layout::{Layout, NONE, Shape};
-use super::{Doubtful, Motion};
+use super::flexible::FlexibleLink;
+use super::{Doubtful, Motion, carrier};
 use crate::dynamics::sweep::inertia_inward::{BodyInertia, eliminate_hinge, solve_hinge};
 use crate::model::hinge::{HingePose, MAX_RATES};
 use crate::model::{HingeKind, LoadAxes, LoadPoint, State, System};
@@ -159,12 +160,15 @@ impl GeneralHinge {
     }
 }
 
-/// Velocities of all O in inertial axes (m/s).
-pub fn velocities(layout: &Layout, motion: &[Motion], general: &[GeneralHinge], out: &mut [Vector3<f64>]) {
+/// Velocities of all O in inertial axes (m/s), and those of the frames of flexible bodies.
+pub fn velocities(layout: &Layout, motion: &[Motion], general: &[GeneralHinge], flexible: &mut [FlexibleLink], out: &mut [Vector3<f64>]) {
     for (k, link) in layout.links.iter().enumerate() {
-        let parent = motion.get(link.parent as usize);
+        let parent = carrier(link, layout, motion, flexible);
         let omega = parent.map_or_else(Vector3::zeros, |m| Vector3::new(m[9], m[10], m[11]));
-        let base = out.get(link.parent as usize).copied().unwrap_or_default();
+        let base = match layout.tips.get(link.tip as usize) {
+            None => out.get(link.parent as usize).copied().unwrap_or_default(),
+            Some(&(body, tip)) => flexible[body as usize].tips[tip as usize].velocity,
+        };
         let (l, slide) = if link.general == NONE {
             let turn = parent.map_or_else(Matrix3::identity, |m| Matrix3::from_column_slice(&m[..9]));
             (turn * Vector3::from(layout.shapes[link.shape as usize].offset), Vector3::zeros())
@@ -173,6 +177,9 @@ pub fn velocities(layout: &Layout, motion: &[Motion], general: &[GeneralHinge], 
             (own.l, linear(&own.relative))
         };
         out[k] = base + omega.cross(&l) + slide;
+        if let Some(own) = flexible.get_mut(link.flexible as usize) {
+            own.follow_velocity(&out[k]);
+        }
     }
 }
 

@@ -1,8 +1,9 @@
-//! Trees of rigid bodies, in one kernel: accelerations and hinge loads at a few nanoseconds per operation.
+//! Trees in one kernel: accelerations and hinge loads at a few nanoseconds per operation.
 //!
-//! The sweeps of [`super::sweep`] serve every system, closed and flexible; most of what they carry a rigid tree does not need. Here the
-//! recursion (Paper Eq. 8 to 13 and 18) runs in inertial axes, so that an articulated inertia is shifted from hinge to hinge and never
-//! turned, in three passes over records that lie in the order of the passes:
+//! The sweeps of [`super::sweep`] serve every system, closed ones and bodies whose modes move their own hinge included; most of what they
+//! carry a tree of rigid and cantilevered bodies does not need. Here the recursion (Paper Eq. 8 to 13 and 18, modes by Eq. 32 to 41) runs in
+//! inertial axes, so that an articulated inertia is shifted from hinge to hinge and never turned, in three passes over records that lie in
+//! the order of the passes:
 //!
 //! | pass | leaves | numbers per body |
 //! |---|---|---|
@@ -11,6 +12,8 @@
 //! | the same, where loads are asked for | [`Outboard`] | 36 |
 //! | [`accelerate`]: accelerations and loads | the load, in place of the above | |
 //!
+//! Modes are the business of [`flexible`], in the axes of each body.
+//!
 //! What is cheaper to compute again than to fetch (the arm from the parent, the velocity terms) is not stored, so that long chains stay
 //! in the caches. Bodies that are alike share their constants. A child that follows its parent in the order, as in every chain, finds the
 //! parent's quantities in registers; only branching bodies keep theirs in memory.
@@ -18,16 +21,21 @@
 //! Axes: "link axes" are those of O, turned so that the axis of a revolute hinge is their third. Registers: [`crate::spatial::lanes`].
 
 mod accelerate;
+mod flexible;
 mod hinge;
 mod inward;
 mod layout;
+mod modal_shape;
 mod outward;
+mod rows;
 
 use crate::model::{State, System};
 use crate::spatial::lanes::{Kernel, Lanes, Processor};
 use crate::spatial::shift::spatial;
+use flexible::FlexibleLink;
 use hinge::GeneralHinge;
 use layout::{Layout, Link, NONE, Shape};
+use modal_shape::ModalShape;
 use nalgebra::{Matrix3, Vector3, Vector6};
 
 /// Attitude (three columns: link axes to inertial axes) and angular velocity (inertial axes) of one body.
@@ -55,9 +63,9 @@ pub(super) struct Branch {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Doubtful;
 
-/// Kernel for one rigid tree, with room for one evaluation.
+/// Kernel for one tree, with room for one evaluation.
 #[derive(Debug, Clone)]
-pub struct RigidTree {
+pub struct TreeKernel {
     processor: Processor,
     layout: Layout,
     motion: Vec<Motion>,
@@ -65,14 +73,16 @@ pub struct RigidTree {
     outboard: Vec<Outboard>,
     branches: Vec<Branch>,
     general: Vec<GeneralHinge>,
+    flexible: Vec<FlexibleLink>,
+    modal_shapes: Vec<ModalShape>,
     /// Velocity of O in inertial axes, for systems with loads.
     velocity: Vec<Vector3<f64>>,
     /// External force on the loaded bodies at O in inertial axes.
     external: Vec<Vector6<f64>>,
 }
 
-impl RigidTree {
-    /// Room for `system`, if it is a tree of rigid bodies; `with_loads` if hinge loads will be asked for.
+impl TreeKernel {
+    /// Room for `system`, if it is a tree that the kernel serves; `with_loads` if hinge loads will be asked for.
     #[must_use]
     pub fn new(system: &System, with_loads: bool) -> Option<Self> {
         Self::on(Processor::detect(), system, with_loads)
@@ -83,6 +93,14 @@ impl RigidTree {
     pub fn on(processor: Processor, system: &System, with_loads: bool) -> Option<Self> {
         let layout = Layout::new(system)?;
         let n = system.bodies.len();
+        let (mut flexible, mut modal_shapes) = (Vec::new(), Vec::new());
+        for (body, children) in &layout.flexible {
+            let of = system.bodies[*body].flexible()?;
+            let sides: Vec<_> = children.iter().map(|&c| &system.bodies[c].parent_side).collect();
+            let shape = ModalShape::find(&mut modal_shapes, of, &sides);
+            let turn = &layout.shapes[layout.links[*body].shape as usize].turn;
+            flexible.push(FlexibleLink::new(system, *body, of, children, &modal_shapes[shape], shape, turn));
+        }
         Some(Self {
             processor,
             motion: vec![[0.0; 12]; n],
@@ -92,13 +110,15 @@ impl RigidTree {
             general: layout.general.iter().map(|&body| GeneralHinge::new(body)).collect(),
             velocity: vec![Vector3::zeros(); if system.loads.is_empty() { 0 } else { n }],
             external: vec![Vector6::zeros(); layout.loaded.len()],
+            flexible,
+            modal_shapes,
             layout,
         })
     }
 
-    /// Accelerations of all hinge rates at `state`, into `hinge`.
-    pub(super) fn evaluate(&mut self, system: &System, state: &State, hinge: &mut [f64]) -> Result<(), Doubtful> {
-        self.processor.run(Evaluation { tree: self, system, state, hinge })
+    /// Accelerations of all hinge rates and modal coordinates at `state`, into `hinge` and `modal`.
+    pub(super) fn evaluate(&mut self, system: &System, state: &State, hinge: &mut [f64], modal: &mut [f64]) -> Result<(), Doubtful> {
+        self.processor.run(Evaluation { tree: self, system, state, hinge, modal })
     }
 
     /// True if evaluations leave hinge loads.
@@ -133,7 +153,20 @@ impl RigidTree {
             let m = &self.motion[body];
             total += force.dot(&spatial(&Vector3::new(m[9], m[10], m[11]), &self.velocity[body]));
         }
-        total
+        total + self.flexible.iter().map(|f| f.power(system, state)).sum::<f64>()
+    }
+
+    /// Angular velocity and acceleration (angular; linear, less gravity) of frame B of flexible body `k` at the last evaluation, B axes.
+    #[must_use]
+    pub fn frame_motion(&self, k: usize) -> Option<(Vector3<f64>, Vector6<f64>)> {
+        let own = self.flexible.get(self.layout.links[k].flexible as usize)?;
+        Some((own.omega, own.alpha))
+    }
+
+    /// Trace of the rotational inertia (kg m^2) of flexible body `k` about B at the last evaluation, where its deformation changes it.
+    #[must_use]
+    pub fn inertia_trace(&self, k: usize) -> Option<f64> {
+        self.flexible.get(self.layout.links[k].flexible as usize)?.inertia_trace()
     }
 
     /// O axes of body `k` to inertial axes.
@@ -144,10 +177,11 @@ impl RigidTree {
 
 /// One evaluation.
 struct Evaluation<'a> {
-    tree: &'a mut RigidTree,
+    tree: &'a mut TreeKernel,
     system: &'a System,
     state: &'a State,
     hinge: &'a mut [f64],
+    modal: &'a mut [f64],
 }
 
 impl Kernel for Evaluation<'_> {
@@ -155,10 +189,10 @@ impl Kernel for Evaluation<'_> {
 
     #[inline(always)]
     fn run<L: Lanes>(self, lanes: L) -> Result<(), Doubtful> {
-        let Self { tree, system, state, hinge } = self;
+        let Self { tree, system, state, hinge, modal } = self;
         outward::outward(lanes, tree, system, state);
         inward::inward(lanes, tree, system, state)?;
-        accelerate::accelerate(lanes, tree, system, state, hinge);
+        accelerate::accelerate(lanes, tree, system, state, hinge, modal);
         Ok(())
     }
 }
@@ -199,11 +233,19 @@ fn arm<L: Lanes>(s: L, shape: &Shape, parent: [L::V; 3], omega: L::V, axis: L::V
     Arm { l, angular, linear: s.cross(omega, s.cross(omega, l)) }
 }
 
-/// Attitude and angular velocity of the parent of `link`.
+/// Attitude and angular velocity of what carries `link`: its parent, or the frame on the parent that modes move.
 #[inline(always)]
-fn parent_motion<L: Lanes>(s: L, link: &Link, motion: &[Motion]) -> ([L::V; 3], L::V) {
-    match motion.get(link.parent as usize) {
+fn parent_motion<L: Lanes>(s: L, link: &Link, layout: &Layout, motion: &[Motion], flexible: &[FlexibleLink]) -> ([L::V; 3], L::V) {
+    match carrier(link, layout, motion, flexible) {
         Some(m) => (attitude(s, m), angular_velocity(s, m)),
         None => (no_turn(s), s.splat(0.0)),
+    }
+}
+
+#[inline(always)]
+fn carrier<'a>(link: &Link, layout: &Layout, motion: &'a [Motion], flexible: &'a [FlexibleLink]) -> Option<&'a Motion> {
+    match layout.tips.get(link.tip as usize) {
+        None => motion.get(link.parent as usize),
+        Some(&(body, tip)) => Some(&flexible[body as usize].tips[tip as usize].motion),
     }
 }

@@ -2,7 +2,7 @@
 
 use super::hinge::external_force;
 use super::layout::Shape;
-use super::{Arm, Doubtful, Gain, NONE, Outboard, RECORD, RigidTree, angular_velocity, arm, attitude, parent_motion};
+use super::{Arm, Doubtful, Gain, NONE, Outboard, RECORD, TreeKernel, angular_velocity, arm, attitude, parent_motion};
 use crate::dynamics::sweep::inertia_inward::SINGULAR;
 use crate::model::{State, System};
 use crate::spatial::SpatialInertia;
@@ -24,8 +24,8 @@ pub struct Felt<V> {
 
 /// Fills the gains, and what loads are made of.
 #[inline(always)]
-pub fn inward<L: Lanes>(s: L, tree: &mut RigidTree, system: &System, state: &State) -> Result<(), Doubtful> {
-    let RigidTree { layout, motion, gains, outboard, branches, general, external, .. } = tree;
+pub fn inward<L: Lanes>(s: L, tree: &mut TreeKernel, system: &System, state: &State) -> Result<(), Doubtful> {
+    let TreeKernel { layout, motion, gains, outboard, branches, general, flexible, modal_shapes, external, .. } = tree;
     for branch in branches.iter_mut() {
         branch.felt = [0.0; RECORD];
     }
@@ -36,7 +36,14 @@ pub fn inward<L: Lanes>(s: L, tree: &mut RigidTree, system: &System, state: &Sta
         if let Some(branch) = branches.get(link.branch as usize) {
             felt.add(s, &branch.felt);
         }
-        felt.add_body(s, shape, turn, omega);
+        if let Some(own) = flexible.get_mut(link.flexible as usize) {
+            let constants = &modal_shapes[own.shape];
+            own.gather_loads(system, state);
+            let (inertia, force) = own.filter(s, constants)?;
+            felt.add(s, &numbers(&inertia, &force));
+        } else {
+            felt.add_body(s, shape, turn, omega);
+        }
         if let Some(load) = external.get_mut(link.load as usize) {
             *load = external_force(system, state, k, &motion[k], &shape.turn);
             felt.moment = s.sub(felt.moment, s.of_three([load[0], load[1], load[2]]));
@@ -44,7 +51,7 @@ pub fn inward<L: Lanes>(s: L, tree: &mut RigidTree, system: &System, state: &Sta
         }
 
         let l = if link.general == NONE {
-            let (parent_turn, parent_omega) = parent_motion(s, link, motion);
+            let (parent_turn, parent_omega) = parent_motion(s, link, layout, motion, flexible);
             let at = arm(s, shape, parent_turn, parent_omega, turn[2], state.velocity[link.v as usize]);
             gains[k] = felt.pass_revolute(s, turn[2], link.applied(system, state, layout), &at)?;
             at.l
@@ -59,7 +66,10 @@ pub fn inward<L: Lanes>(s: L, tree: &mut RigidTree, system: &System, state: &Sta
             felt.write(s, out);
         }
         felt.shift(s, l);
-        if link.parent as usize + 1 != k || k == 0 {
+        if let Some(&(body, tip)) = layout.tips.get(link.tip as usize) {
+            felt.write(s, &mut flexible[body as usize].tips[tip as usize].felt);
+            felt = Felt::none(s);
+        } else if link.parent as usize + 1 != k || k == 0 {
             if let Some(branch) = layout.links.get(link.parent as usize).and_then(|p| branches.get_mut(p.branch as usize)) {
                 felt.add(s, &branch.felt);
                 felt.write(s, &mut branch.felt);
@@ -233,7 +243,7 @@ fn take_right<L: Lanes>(s: L, block: [L::V; 3], [x, y, z]: [L::V; 3], to: [L::V;
 
 /// Inertia and force of a record.
 #[inline(never)]
-fn plain(f: &Outboard) -> (SpatialInertia, Vector6<f64>) {
+pub fn plain(f: &Outboard) -> (SpatialInertia, Vector6<f64>) {
     let block = |at: usize| Matrix3::from_column_slice(&f[at..at + 9]);
     let symmetric = |m: Matrix3<f64>| (m + m.transpose()) * 0.5;
     let inertia = SpatialInertia { rotational: symmetric(block(0)), coupling: block(9), translational: symmetric(block(18)) };

@@ -1,4 +1,4 @@
-//! What of a rigid tree stays the same, in the order and the size in which the passes want it.
+//! What of a tree stays the same, in the order and the size in which the passes want it.
 
 use crate::dynamics::sweep::graded::GradedInertia;
 use crate::model::{Body, BodyKind, HingeKind, State, System, TimeFunction};
@@ -32,14 +32,18 @@ pub struct Link {
     pub parent: u32,
     /// Index of its [`Shape`].
     pub shape: u32,
-    /// Index in `RigidTree::branches`, or [`NONE`].
+    /// Index in `TreeKernel::branches`, or [`NONE`].
     pub branch: u32,
-    /// Index in `RigidTree::general`, [`NONE`] for a revolute hinge.
+    /// Index in `TreeKernel::general`, [`NONE`] for a revolute hinge.
     pub general: u32,
     /// Index in [`Layout::drives`], or [`NONE`] for a revolute hinge with nothing but a constant torque.
     pub drive: u32,
     /// Index in [`Layout::loaded`], or [`NONE`].
     pub load: u32,
+    /// Index in `TreeKernel::flexible`, [`NONE`] for a rigid body.
+    pub flexible: u32,
+    /// Index in [`Layout::tips`] if modes of the parent move the hinge, or [`NONE`].
+    pub tip: u32,
     /// First coordinate.
     pub q: u32,
     /// First rate.
@@ -72,31 +76,45 @@ pub struct Layout {
     pub drives: Vec<Drive>,
     /// Bodies with a hinge of any other kind.
     pub general: Vec<usize>,
-    /// Bodies with external loads.
+    /// Rigid bodies with external loads.
     pub loaded: Vec<usize>,
+    /// Flexible bodies, each with the children that its modes move.
+    pub flexible: Vec<(usize, Vec<usize>)>,
+    /// Moved hinges: index of the parent in `flexible`, place among its children.
+    pub tips: Vec<(u32, u32)>,
     /// Number of bodies with a child that does not follow them.
     pub branches: usize,
 }
 
 impl Layout {
-    /// Of `system`, if it is a tree of rigid bodies whose masses the plain recursion bears, and small enough for its indices.
+    /// Of `system`, if it is a tree whose modes hold the inboard hinges, whose masses the plain recursion bears, and small enough for its
+    /// indices.
     pub fn new(system: &System) -> Option<Self> {
-        let rigid = system.bodies.iter().all(|b| matches!(b.kind, BodyKind::Rigid(_)));
+        let held = system.bodies.iter().all(|b| b.flexible().is_none_or(|f| !f.inboard.moves()));
         let largest = system.position_count.max(system.velocity_count).max(system.bodies.len());
-        if !rigid || !system.closures.is_empty() || largest >= NONE as usize || GradedInertia::new(system).is_some() {
+        if !held || !system.closures.is_empty() || largest >= NONE as usize || GradedInertia::new(system).is_some() {
             return None;
         }
-        let mut layout =
-            Self { links: Vec::with_capacity(system.bodies.len()), shapes: vec![], drives: vec![], general: vec![], loaded: vec![], branches: 0 };
+        let mut layout = Self {
+            links: Vec::with_capacity(system.bodies.len()),
+            shapes: vec![],
+            drives: vec![],
+            general: vec![],
+            loaded: vec![],
+            flexible: vec![],
+            tips: vec![],
+            branches: 0,
+        };
         let mut known: HashMap<[u64; 34], u32> = HashMap::new();
         for (k, body) in system.bodies.iter().enumerate() {
             let parent_turn = body.parent.map_or_else(Matrix3::identity, |p| layout.shapes[layout.links[p].shape as usize].turn);
-            let shape = Shape::new(body, &parent_turn)?;
+            let shape = Shape::new(body, body.parent.map(|p| &system.bodies[p]), &parent_turn);
             let shape = *known.entry(shape.bits()).or_insert_with(|| {
                 layout.shapes.push(shape);
                 index(layout.shapes.len() - 1)
             });
-            let load = if system.loads.iter().any(|l| l.body == k) { push(&mut layout.loaded, k) } else { NONE };
+            let is_rigid = body.flexible().is_none();
+            let load = if is_rigid && system.loads.binary_search_by_key(&k, |l| l.body).is_ok() { push(&mut layout.loaded, k) } else { NONE };
             let mut link = Link {
                 parent: body.parent.map_or(NONE, index),
                 shape,
@@ -104,6 +122,8 @@ impl Layout {
                 general: NONE,
                 drive: NONE,
                 load,
+                flexible: if is_rigid { NONE } else { push(&mut layout.flexible, (k, vec![])) },
+                tip: NONE,
                 q: index(body.position),
                 v: index(body.velocity),
                 torque: 0.0,
@@ -115,8 +135,14 @@ impl Layout {
             } else {
                 link.general = push(&mut layout.general, k);
             }
+            if let Some(parent) = body.parent.filter(|_| body.parent_side.moves()) {
+                let at = layout.links[parent].flexible;
+                let children = &mut layout.flexible[at as usize].1;
+                children.push(k);
+                link.tip = push(&mut layout.tips, (at, index(children.len() - 1)));
+            }
             layout.links.push(link);
-            if let Some(parent) = body.parent.filter(|p| p + 1 != k) {
+            if let Some(parent) = body.parent.filter(|p| p + 1 != k && !body.parent_side.moves()) {
                 let slot = &mut layout.links[parent].branch;
                 if *slot == NONE {
                     *slot = index(layout.branches);
@@ -183,22 +209,32 @@ fn turn_to(axis: &Vector3<f64>) -> Matrix3<f64> {
 }
 
 impl Shape {
-    fn new(body: &Body, parent_turn: &Matrix3<f64>) -> Option<Self> {
-        let BodyKind::Rigid(inertia) = &body.kind else { return None };
+    /// Of `body` on `parent`, whose link axes are `parent_turn` in its O axes.
+    fn new(body: &Body, parent: Option<&Body>, parent_turn: &Matrix3<f64>) -> Self {
         let turn = revolute_axis(body).map_or_else(Matrix3::identity, turn_to);
         let side = &body.parent_side;
-        let outer = side.rotation * side.offset_rotation;
-        let position = side.position + side.rotation * side.offset;
+        let (mut outer, mut position) = (side.rotation * side.offset_rotation, side.position + side.rotation * side.offset);
+        if side.moves() {
+            // the frame of the moved interface stands in for the parent
+            (outer, position) = (*parent_turn, Vector3::zeros());
+        } else if let Some(flexible) = parent.and_then(Body::flexible) {
+            // from the frame of the modal file to O
+            let back = flexible.inboard.rotation.transpose();
+            (outer, position) = (back * outer, back * (position - flexible.inboard.position));
+        }
         let column = |m: Matrix3<f64>| -> [f64; 9] { std::array::from_fn(|i| m[i]) };
-        let rotational = turn.transpose() * inertia.rotational * turn;
-        Some(Self {
+        let (rotational, first_moment) = match &body.kind {
+            BodyKind::Rigid(inertia) => (turn.transpose() * inertia.rotational * turn, turn.tr_mul(&inertia.first_moment())),
+            BodyKind::Flexible(_) => (Matrix3::zeros(), Vector3::zeros()),
+        };
+        Self {
             fixed: column(parent_turn.transpose() * outer * turn),
             offset: parent_turn.tr_mul(&position).into(),
-            first_moment: turn.tr_mul(&inertia.first_moment()).into(),
-            mass: body.mass(),
+            first_moment: first_moment.into(),
+            mass: if body.flexible().is_some() { 0.0 } else { body.mass() },
             inertia: column((rotational + rotational.transpose()) * 0.5),
             turn,
-        })
+        }
     }
 
     fn bits(&self) -> [u64; 34] {

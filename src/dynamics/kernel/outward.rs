@@ -1,18 +1,18 @@
 //! First pass: attitude and angular velocity of every body, from the base to the tips. Source: Paper Eq. 8, in inertial axes.
 
 use super::layout::Shape;
-use super::{Motion, NONE, RigidTree, angular_velocity, attitude, no_turn, parent_motion};
+use super::{Motion, NONE, TreeKernel, angular_velocity, attitude, carrier, no_turn, parent_motion};
 use crate::model::{State, System};
 use crate::spatial::lanes::Lanes;
 
 /// Fills the motions, and what general hinges make of them.
 #[inline(always)]
-pub fn outward<L: Lanes>(s: L, tree: &mut RigidTree, system: &System, state: &State) {
-    let RigidTree { layout, motion, general, velocity, .. } = tree;
+pub fn outward<L: Lanes>(s: L, tree: &mut TreeKernel, system: &System, state: &State) {
+    let TreeKernel { layout, motion, general, flexible, modal_shapes, velocity, .. } = tree;
     let (mut last, mut turn, mut omega) = (NONE, no_turn(s), s.splat(0.0));
     for (k, link) in layout.links.iter().enumerate() {
-        if link.parent != last {
-            (turn, omega) = parent_motion(s, link, motion);
+        if link.parent != last || link.tip != NONE {
+            (turn, omega) = parent_motion(s, link, layout, motion, flexible);
         }
         let shape = &layout.shapes[link.shape as usize];
         if link.general == NONE {
@@ -22,14 +22,18 @@ pub fn outward<L: Lanes>(s: L, tree: &mut RigidTree, system: &System, state: &St
             motion[k] = record(s, turn, omega);
         } else {
             let own = &mut general[link.general as usize];
-            let parent = motion.get(link.parent as usize).copied();
+            let parent = carrier(link, layout, motion, flexible).copied();
             motion[k] = own.follow(system, state, shape, parent.as_ref());
             (turn, omega) = (attitude(s, &motion[k]), angular_velocity(s, &motion[k]));
+        }
+        if let Some(own) = flexible.get_mut(link.flexible as usize) {
+            let constants = &modal_shapes[own.shape];
+            own.follow(s, system, state, constants, &motion[k]);
         }
         last = u32::try_from(k).unwrap_or(NONE);
     }
     if !velocity.is_empty() {
-        super::hinge::velocities(layout, motion, general, velocity);
+        super::hinge::velocities(layout, motion, general, flexible, velocity);
     }
 }
 
