@@ -39,28 +39,11 @@ impl FramePose {
             let position = attachment.position;
             return Self { rotation: attachment.rotation, position, interface: position, theta: Vector3::zeros() };
         }
-        Self::displaced(attachment, &sum(&attachment.mode_shape, eta))
-    }
-
-    /// Pose of `attachment` when its modes turn and move the interface by `displacement` (rotation vector; translation in m).
-    #[must_use]
-    pub fn displaced(attachment: &Attachment, displacement: &Vector6<f64>) -> Self {
-        let theta = angular(displacement);
-        let interface = attachment.position + linear(displacement);
+        let displacement = sum(&attachment.mode_shape, eta);
+        let theta = angular(&displacement);
+        let interface = attachment.position + linear(&displacement);
         let axes = rotation::matrix_of_vector(&theta) * attachment.rotation;
         Self { rotation: axes * attachment.offset_rotation, position: interface + axes * attachment.offset, interface, theta }
-    }
-
-    /// Rate of the interface's rotation vector to the angular velocity that it makes.
-    #[must_use]
-    pub fn jacobian(&self) -> Matrix3<f64> {
-        rotation::left_jacobian(&self.theta)
-    }
-
-    /// Origin of the interface that carries the frame, in body axes (m).
-    #[must_use]
-    pub fn interface(&self) -> Vector3<f64> {
-        self.interface
     }
 
     /// Mode shape (rotation; translation) at the point `point` (body axes) that moves with the frame, one per mode.
@@ -79,13 +62,8 @@ impl FramePose {
         if !attachment.moves() {
             return spatial(&Vector3::zeros(), &omega.cross(&omega.cross(point)));
         }
-        self.bias_of(&sum(&attachment.mode_shape, eta_dot), point, omega)
-    }
-
-    /// The same for a frame whose interface is displaced at the rate `rate`.
-    #[must_use]
-    pub fn bias_of(&self, rate: &Vector6<f64>, point: &Vector3<f64>, omega: &Vector3<f64>) -> Vector6<f64> {
-        let (theta_dot, u_dot) = (angular(rate), linear(rate));
+        let rate = sum(&attachment.mode_shape, eta_dot);
+        let (theta_dot, u_dot) = (angular(&rate), linear(&rate));
         let omega_rel = rotation::left_jacobian(&self.theta) * theta_dot;
         let spin = rotation::left_jacobian_rate(&self.theta, &theta_dot) + omega.cross(&omega_rel);
         let (lever, omega_frame) = (point - self.interface, omega + omega_rel);

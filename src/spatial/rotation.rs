@@ -132,8 +132,8 @@ impl Coefficients {
     fn at(theta: &Vector3<f64>) -> Self {
         let t2 = theta.norm_squared();
         if t2 < 1.0 {
-            let (a, a_slope) = alternating_series(t2, 2.0);
-            let (b, b_slope) = alternating_series(t2, 3.0);
+            let (a, a_slope) = series(t2, &OF_COSINE);
+            let (b, b_slope) = series(t2, &OF_SINE);
             return Self { a, b, a_slope, b_slope };
         }
         let t = t2.sqrt();
@@ -147,25 +147,53 @@ impl Coefficients {
     }
 }
 
-/// Sum over k of `(-t2)^k / (2k + m)!` for m = 2 or 3, and its derivative with respect to `t2 / 2`.
-fn alternating_series(t2: f64, m: f64) -> (f64, f64) {
-    let mut coefficient = if m < 2.5 { 1.0 / 2.0 } else { 1.0 / 6.0 };
-    let (mut value, mut slope, mut power) = (coefficient, 0.0, 1.0);
-    // ten terms: the next one is below 1e-20 for t2 < 1
-    for k in 1..=10_u8 {
-        let k2 = 2.0 * f64::from(k);
-        coefficient /= -(k2 + m - 1.0) * (k2 + m);
-        slope += k2 * coefficient * power;
-        power *= t2;
-        value += coefficient * power;
+/// Terms of the series: the next one is below 1e-20 for t2 < 1.
+const TERMS: usize = 10;
+
+/// `(-1)^k / (2k + m)!` for k = 0, 1, ...
+const fn alternating(m: usize) -> [f64; TERMS] {
+    let mut coefficients = [0.0; TERMS];
+    let (mut k, mut coefficient) = (0, if m == 2 { 1.0 / 2.0 } else { 1.0 / 6.0 });
+    while k < TERMS {
+        coefficients[k] = coefficient;
+        let next = (2 * k + m) as f64;
+        coefficient /= -(next + 1.0) * (next + 2.0);
+        k += 1;
     }
-    (value, slope)
+    coefficients
+}
+
+const OF_COSINE: [f64; TERMS] = alternating(2);
+const OF_SINE: [f64; TERMS] = alternating(3);
+
+/// Sum over k of `coefficients_k t2^k`, and its derivative with respect to `t2 / 2`.
+fn series(t2: f64, coefficients: &[f64; TERMS]) -> (f64, f64) {
+    let (mut value, mut slope) = (0.0, 0.0);
+    for coefficient in coefficients.iter().rev() {
+        slope = slope * t2 + value;
+        value = value * t2 + coefficient;
+    }
+    (value, 2.0 * slope)
 }
 
 /// Rotation matrix of a rotation vector (Rodrigues).
 #[must_use]
 pub fn matrix_of_vector(theta: &Vector3<f64>) -> Matrix3<f64> {
     matrix_of_quaternion(&quaternion_of_vector(theta))
+}
+
+/// A frame that turns with the rotation vector `theta`: its axes, its left Jacobian, and [`left_jacobian_rate`] at the rate `theta_dot`.
+#[inline]
+#[must_use]
+pub fn turning_frame(theta: &Vector3<f64>, theta_dot: &Vector3<f64>) -> (Matrix3<f64>, Matrix3<f64>, Vector3<f64>) {
+    let c = Coefficients::at(theta);
+    let (along, cross) = (theta.dot(theta_dot), theta.cross(theta_dot));
+    let rate = cross * (c.a_slope * along) + theta.cross(&cross) * (c.b_slope * along) + theta_dot.cross(&cross) * c.b;
+    let (t, t2) = (skew(theta), theta.norm_squared());
+    let square = theta * theta.transpose() - Matrix3::from_diagonal_element(t2);
+    // sin t / t = 1 - b t^2 and (1 - cos t) / t^2 = a
+    let axes = Matrix3::identity() + t * (1.0 - c.b * t2) + square * c.a;
+    (axes, Matrix3::identity() + t * c.a + square * c.b, rate)
 }
 
 /// Left Jacobian of SO(3): `omega = Jl(theta) theta_dot` in the axes that do not turn.
@@ -257,6 +285,19 @@ mod tests {
             let (plus, minus) = (left_jacobian(&(theta + theta_dot * h)), left_jacobian(&(theta - theta_dot * h)));
             let slope = (plus - minus) / (2.0 * h) * theta_dot;
             assert!((slope - left_jacobian_rate(&theta, &theta_dot)).norm() < h * h + EPS / h, "{theta}");
+        }
+    }
+
+    #[test]
+    fn turning_frame_is_its_three_parts() {
+        let theta_dot = Vector3::new(0.3, 0.7, -0.2);
+        for theta in angles() {
+            let (axes, jacobian, rate) = turning_frame(&theta, &theta_dot);
+            // sums of a few products of numbers below ten
+            let allowed = 100.0 * EPS * (1.0 + theta.norm_squared());
+            assert!((axes - matrix_of_vector(&theta)).norm() < allowed, "{theta}");
+            assert!((jacobian - left_jacobian(&theta)).norm() < allowed, "{theta}");
+            assert!((rate - left_jacobian_rate(&theta, &theta_dot)).norm() < allowed, "{theta}");
         }
     }
 

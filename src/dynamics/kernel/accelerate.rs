@@ -55,8 +55,7 @@ pub fn accelerate<L: Lanes>(s: L, tree: &mut TreeKernel, system: &System, state:
         }
         if let Some(own) = flexible.get_mut(link.flexible as usize) {
             let constants = &modal_shapes[own.shape];
-            let outer = spatial(&Vector3::from(s.three(angular)), &Vector3::from(s.three(linear)));
-            own.accelerate(s, constants, &outer, &mut modal[system.bodies[k].modal_range()]);
+            own.accelerate(s, constants, [angular, linear], &mut modal[system.bodies[k].modal_range()]);
         }
         if let Some(branch) = branches.get_mut(link.branch as usize) {
             let (a, b) = (s.three(angular), s.three(linear));

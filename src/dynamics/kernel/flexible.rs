@@ -12,47 +12,18 @@
 //! Source: Paper Eq. 32 to 41 with DESIGN 3.3 carried through; all in the axes of frame B.
 #![expect(non_snake_case, reason = "symbols follow the table in dynamics/mod.rs")]
 
-use super::modal_shape::ModalShape;
-use super::rows::{
-    Block, block_count, fill, gram, inverse_sum, product, spill, sum_of, take_transposed, times, times_transposed, two_products,
-};
-use super::{Doubtful, Motion, Outboard, RECORD};
+use super::inward::Felt;
+use super::modal_shape::{ModalShape, residual_of};
+use super::rows::{Block, block_count, fill, gram, product, spill, sum_of, take_transposed};
+use super::six::{Six, inverse_sum, inverse_sum_of_blocks};
+use super::tip::{Tip, columns_of, rows_of};
+use super::{Doubtful, Motion};
 use crate::dynamics::flexible_inertia::FlexibleInertia;
-use crate::dynamics::frame_motion::FramePose;
 use crate::dynamics::sweep::force_inward::load_shape;
 use crate::model::{FlexibleBody, InertiaOrder, LoadAxes, State, System};
-use crate::spatial::SpatialInertia;
 use crate::spatial::lanes::Lanes;
-use crate::spatial::rotation::skew;
-use crate::spatial::shift::{angular, force_from, linear, motion_to, rotate, rotate_back, spatial};
-use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
-
-/// A child that the modes move.
-#[derive(Debug, Clone)]
-pub struct Tip {
-    child: usize,
-    frame: FramePose,
-    /// Frame O+ in inertial axes.
-    pub motion: Motion,
-    /// Velocity of the origin of O+ in inertial axes, for systems with loads.
-    pub velocity: Vector3<f64>,
-    /// Bias acceleration of O+, B axes.
-    bias: Vector6<f64>,
-    /// Rate of the interface's displacement.
-    rate: Vector6<f64>,
-    /// What the child leaves at O+, inertial axes.
-    pub felt: Outboard,
-    /// `T`.
-    turn: Matrix6<f64>,
-    /// `Z`.
-    Z: Matrix6<f64>,
-    /// `F' Phi'`.
-    coupling: Matrix6<f64>,
-    /// `Phi r`, then `Phi eta_ddot`.
-    e: Vector6<f64>,
-    /// Acceleration of O+, inertial axes.
-    pub acceleration: [f64; 6],
-}
+use crate::spatial::shift::{force_from, rotate, rotate_back, spatial};
+use nalgebra::{Matrix3, Vector3, Vector6};
 
 /// One flexible body.
 #[derive(Debug, Clone)]
@@ -62,8 +33,9 @@ pub struct FlexibleLink {
     pub shape: usize,
     /// B axes to link axes.
     frame: Matrix3<f64>,
-    /// O in B (m).
+    /// O in B (m), and whether it lies elsewhere than B.
     origin: Vector3<f64>,
+    is_offset: bool,
     /// B axes to inertial axes.
     rotation: Matrix3<f64>,
     /// Angular velocity, B axes.
@@ -86,9 +58,13 @@ pub struct FlexibleLink {
     shape_at_load: Vec<Vector6<f64>>,
     /// Rigid rows of b.
     b: Vector6<f64>,
-    /// `S~` of all tips, `N`, and room to find it.
-    inertia: Vec<f64>,
-    N: Vec<f64>,
+    /// `S~` of all tips.
+    inertia: Vec<Six>,
+    /// `N` of all pairs of tips, row by row.
+    N: Vec<Six>,
+    /// `y` of all tips.
+    y: Vec<[[f64; 4]; 2]>,
+    /// Room to find N of several tips.
     work: Vec<f64>,
     /// For inertia of order 1 and 2: at the present deformation.
     deformed: Option<Box<Deformed>>,
@@ -99,33 +75,19 @@ pub struct FlexibleLink {
 struct Deformed {
     inertia: FlexibleInertia,
     rows: Vec<Block<6>>,
-    residual: Matrix6<f64>,
+    residual: Six,
     b_modal: Vec<f64>,
 }
 
 impl FlexibleLink {
     /// Of body `body` with the constants `shape` (number `index`), whose link axes are `turn` in O axes.
     pub fn new(system: &System, body: usize, flexible: &FlexibleBody, children: &[usize], shape: &ModalShape, index: usize, turn: &Matrix3<f64>) -> Self {
-        let (n, blocks, size) = (shape.modes, block_count(shape.modes), 6 * children.len());
+        let (n, blocks, tips) = (shape.modes, block_count(shape.modes), children.len());
         let loaded = system.loads.iter().any(|l| l.body == body);
-        let tip = |&child: &usize| Tip {
-            child,
-            frame: FramePose::default(),
-            motion: [0.0; 12],
-            velocity: Vector3::zeros(),
-            bias: Vector6::zeros(),
-            rate: Vector6::zeros(),
-            felt: [0.0; RECORD],
-            turn: Matrix6::identity(),
-            Z: Matrix6::zeros(),
-            coupling: Matrix6::zeros(),
-            e: Vector6::zeros(),
-            acceleration: [0.0; 6],
-        };
         let deformed = || Deformed {
             inertia: FlexibleInertia::new(n),
             rows: shape.rows.clone(),
-            residual: Matrix6::zeros(),
+            residual: Six::ZERO,
             b_modal: vec![0.0; n],
         };
         Self {
@@ -133,12 +95,13 @@ impl FlexibleLink {
             shape: index,
             frame: turn.transpose() * flexible.inboard.rotation.transpose(),
             origin: flexible.inboard.position,
+            is_offset: flexible.inboard.position != Vector3::zeros(),
             rotation: Matrix3::identity(),
             omega: Vector3::zeros(),
             alpha: Vector6::zeros(),
             bias: Vector6::zeros(),
             velocity: Vector3::zeros(),
-            tips: children.iter().map(tip).collect(),
+            tips: children.iter().map(|&child| Tip::new(child)).collect(),
             position: vec![[0.0; 4]; blocks],
             rate: vec![[0.0; 4]; blocks],
             r: vec![[0.0; 4]; blocks],
@@ -147,9 +110,10 @@ impl FlexibleLink {
             external_force: Vector6::zeros(),
             shape_at_load: vec![Vector6::zeros(); if loaded { n } else { 0 }],
             b: Vector6::zeros(),
-            inertia: vec![0.0; size * size],
-            N: vec![0.0; size * size],
-            work: vec![0.0; 2 * size * size],
+            inertia: vec![Six::ZERO; tips],
+            N: vec![Six::ZERO; tips * tips],
+            y: vec![[[0.0; 4]; 2]; tips],
+            work: vec![0.0; if tips > 1 { 72 * tips * tips } else { 0 }],
             deformed: (shape.order != InertiaOrder::Zeroth).then(|| Box::new(deformed())),
         }
     }
@@ -177,8 +141,8 @@ impl FlexibleLink {
         }
         self.take_elastic(s, shape, flexible, eta, eta_dot);
         for (tip, rows) in self.tips.iter_mut().zip(&shape.interfaces) {
-            let [displacement, rate] = two_products(s, rows, &self.position, &self.rate);
-            tip.follow(&system.bodies[tip.child].parent_side, displacement, rate, &self.rotation, &omega);
+            let side = &system.bodies[tip.child].parent_side;
+            tip.follow(s, side, rows, [&self.position, &self.rate], &self.rotation, &omega);
         }
     }
 
@@ -265,97 +229,93 @@ impl FlexibleLink {
 
     /// Second pass: inertia and residual force of the body with its modes, at O in inertial axes.
     #[inline(always)]
-    pub fn filter<L: Lanes>(&mut self, s: L, shape: &ModalShape) -> Result<(SpatialInertia, Vector6<f64>), Doubtful> {
-        let size = 6 * self.tips.len();
-        let mut z = self.b - self.external_force;
-        for (c, (tip, rows)) in self.tips.iter_mut().zip(&shape.interfaces).enumerate() {
-            let (S, felt) = tip.gather(&self.rotation);
-            z += force_from(&tip.frame.position, &felt);
-            take_transposed(s, rows, &tip.turn.tr_mul(&felt), &mut self.r);
-            let turned = times(s, &tip.turn.transpose(), &times(s, &S, &tip.turn));
-            for i in 0..6 {
-                for j in 0..6 {
-                    self.inertia[(6 * c + i) * size + 6 * c + j] = turned[(i, j)];
-                }
-            }
+    pub fn filter<L: Lanes>(&mut self, s: L, shape: &ModalShape) -> Result<Felt<L::V>, Doubtful> {
+        let own = self.b - self.external_force;
+        let mut z = [s.of_three([own[0], own[1], own[2]]), s.of_three([own[3], own[4], own[5]])];
+        for ((tip, rows), inertia) in self.tips.iter().zip(&shape.interfaces).zip(&mut self.inertia) {
+            let (S, felt) = tip.gather(s, &self.rotation);
+            z = [s.add(s.add(z[0], felt[0]), s.cross(s.of_three(tip.position.into()), felt[1])), s.add(z[1], felt[1])];
+            take_transposed(s, rows, tip.turn_back(s, felt), &mut self.r);
+            *inertia = tip.turn_inertia(s, &S);
         }
         let (rows, residual) = match &mut self.deformed {
             None => (&shape.rows, &shape.residual),
             Some(now) => {
-                let of = &now.inertia;
-                for (b, block) in now.rows.iter_mut().enumerate() {
-                    for (i, row) in of.row.iter().skip(4 * b).take(4).enumerate() {
-                        for c in 0..6 {
-                            block[c][i] = row[c];
-                        }
-                    }
-                }
-                now.residual = of.rigid.matrix() - gram(s, &now.rows, &now.rows);
+                now.gather_rows();
+                now.residual = residual_of(s, &now.inertia.rigid, &now.rows);
                 (&now.rows, &now.residual)
             }
         };
+        let constant = shape.order == InertiaOrder::Zeroth;
         for (c, (tip, phi)) in self.tips.iter_mut().zip(&shape.interfaces).enumerate() {
-            tip.e = product(s, phi, &self.r);
-            tip.coupling = if shape.order == InertiaOrder::Zeroth { shape.coupling[c] } else { gram(s, rows, phi) };
-            tip.Z = tip.reach().ok_or(Doubtful)? - tip.coupling;
-        }
-        let solved = match size {
-            0 => true,
-            6 => inverse_sum(6, &self.inertia, &shape.flexibility, &mut self.work, &mut self.N),
-            _ => inverse_sum(size, &self.inertia, &shape.flexibility, &mut self.work, &mut self.N),
-        };
-        if !solved {
-            return Err(Doubtful);
-        }
-        let mut P = *residual;
-        z += product(s, rows, &self.r);
-        for a in 0..self.tips.len() {
-            for b in 0..self.tips.len() {
-                let N = Matrix6::from_fn(|i, j| self.N[(6 * a + i) * size + 6 * b + j]);
-                P += times_transposed(s, &times(s, &self.tips[a].Z, &N), &self.tips[b].Z);
-                z += self.tips[a].Z * (N * self.tips[b].e);
+            let e = product(s, phi, &self.r);
+            tip.e = [s.store(e[0]), s.store(e[1])];
+            tip.coupling = if constant { shape.coupling[c] } else { gram(s, rows, phi) };
+            if !tip.reach(s) {
+                return Err(Doubtful);
             }
         }
-        // from B to O, which lies at `origin`
-        let P = SpatialInertia::from_matrix(&P);
-        let back = -self.origin;
-        let z = force_from(&back, &(z + P.times(&self.bias)));
-        Ok((P.moved_by(&back).rotated(&self.rotation), rotate(&self.rotation, &z)))
+        match self.tips.len() {
+            0 => {}
+            1 => self.N[0] = inverse_sum(s, &self.inertia[0], &shape.flexibility[0]).ok_or(Doubtful)?,
+            tips => inverse_sum_of_blocks(tips, &self.inertia, &shape.flexibility, &mut self.work, &mut self.N).ok_or(Doubtful)?,
+        }
+        let mut P = *residual;
+        let felt = product(s, rows, &self.r);
+        z = [s.add(z[0], felt[0]), s.add(z[1], felt[1])];
+        for (a, left) in self.tips.iter().enumerate() {
+            for (b, right) in self.tips.iter().enumerate() {
+                let reach = left.Z.times(s, &self.N[a * self.tips.len() + b]);
+                let felt = reach.combine(s, [right.e[0][0], right.e[0][1], right.e[0][2], right.e[1][0], right.e[1][1], right.e[1][2]]);
+                z = [s.add(z[0], felt[0]), s.add(z[1], felt[1])];
+                P = reach.times_transposed_plus(s, &right.Z, &P);
+            }
+        }
+        // the bias of B, to inertial axes, and from B to O, which lies at `origin`
+        let b = &self.bias;
+        let biased = P.combine(s, [0.0, 0.0, 0.0, b[3], b[4], b[5]]);
+        let mut felt = Felt::turned(s, &P, [s.add(z[0], biased[0]), s.add(z[1], biased[1])], &self.rotation);
+        if self.is_offset {
+            felt.shift(s, s.combine(columns_of(s, &self.rotation), s.of_three((-self.origin).into())));
+        }
+        Ok(felt)
     }
 
     /// Third pass: accelerations of the modes into `modal`, and those of the moved children's frames; `outer` is the acceleration at O,
     /// inertial axes.
     #[inline(always)]
-    pub fn accelerate<L: Lanes>(&mut self, s: L, shape: &ModalShape, outer: &Vector6<f64>, modal: &mut [f64]) {
-        let size = 6 * self.tips.len();
-        self.alpha = motion_to(&-self.origin, &rotate_back(&self.rotation, outer)) + self.bias;
+    pub fn accelerate<L: Lanes>(&mut self, s: L, shape: &ModalShape, outer: [L::V; 2], modal: &mut [f64]) {
+        let back = rows_of(s, &self.rotation);
+        let (turning, at_origin) = (s.combine(back, outer[0]), s.combine(back, outer[1]));
+        let b = &self.bias;
+        let arm = s.of_three((-self.origin).into());
+        let alpha = [turning, s.add(s.add(at_origin, s.cross(turning, arm)), s.of_three([b[3], b[4], b[5]]))];
+        let (a, l) = (s.three(alpha[0]), s.three(alpha[1]));
+        self.alpha = Vector6::new(a[0], a[1], a[2], l[0], l[1], l[2]);
         let rows = self.deformed.as_ref().map_or(&shape.rows, |now| &now.rows);
-        take_transposed(s, rows, &self.alpha, &mut self.r);
+        take_transposed(s, rows, alpha, &mut self.r);
         // Phi eta_ddot = e - F' Phi' alpha - Phi Phi' y, y = N (e + Z' alpha)
-        for a in 0..self.tips.len() {
-            let mut y = Vector6::zeros();
+        let tips = self.tips.len();
+        for a in 0..tips {
+            let mut y = [s.splat(0.0); 2];
             for (b, tip) in self.tips.iter().enumerate() {
-                let driven = tip.e + tip.Z.tr_mul(&self.alpha);
-                for i in 0..6 {
-                    for j in 0..6 {
-                        y[i] += self.N[(6 * a + i) * size + 6 * b + j] * driven[j];
-                    }
-                }
+                let (e, reached) = (tip.e, tip.Z.apply_transposed(s, alpha));
+                let driven = [s.add(s.load(e[0]), reached[0]), s.add(s.load(e[1]), reached[1])];
+                let part = self.N[a * tips + b].apply(s, driven);
+                y = [s.add(y[0], part[0]), s.add(y[1], part[1])];
             }
-            take_transposed(s, &shape.interfaces[a], &y, &mut self.r);
-            self.work[6 * a..6 * a + 6].copy_from_slice(y.as_slice());
+            take_transposed(s, &shape.interfaces[a], y, &mut self.r);
+            self.y[a] = [s.store(y[0]), s.store(y[1])];
         }
         spill(&self.r, modal);
         for (a, tip) in self.tips.iter_mut().enumerate() {
-            let mut moved = tip.e - tip.coupling.tr_mul(&self.alpha);
-            for i in 0..6 {
-                for j in 0..size {
-                    moved[i] -= shape.flexibility[(6 * a + i) * size + j] * self.work[j];
-                }
+            let carried = tip.coupling.apply_transposed(s, alpha);
+            let mut moved = [s.sub(s.load(tip.e[0]), carried[0]), s.sub(s.load(tip.e[1]), carried[1])];
+            for (b, y) in self.y.iter().enumerate() {
+                let held = shape.flexibility[a * tips + b].combine(s, [y[0][0], y[0][1], y[0][2], y[1][0], y[1][1], y[1][2]]);
+                moved = [s.sub(moved[0], held[0]), s.sub(moved[1], held[1])];
             }
-            let alpha = motion_to(&tip.frame.position, &self.alpha) + tip.turn * moved + tip.bias;
-            let alpha = rotate(&self.rotation, &alpha);
-            tip.acceleration.copy_from_slice(alpha.as_slice());
+            tip.accelerate(s, &self.rotation, alpha, moved);
         }
     }
 
@@ -363,8 +323,7 @@ impl FlexibleLink {
     pub fn follow_velocity(&mut self, at_origin: &Vector3<f64>) {
         self.velocity = self.rotation.tr_mul(at_origin) - self.omega.cross(&self.origin);
         for tip in &mut self.tips {
-            let own = linear(&(tip.turn * tip.rate));
-            tip.velocity = self.rotation * (self.velocity + self.omega.cross(&tip.frame.position) + own);
+            tip.follow_velocity(&self.rotation, &self.omega, &self.velocity);
         }
     }
 
@@ -383,48 +342,16 @@ impl FlexibleLink {
     }
 }
 
-impl Tip {
-    /// Pose, rates and bias of the frame on a body at `rotation` that turns with `omega` (B axes).
+impl Deformed {
+    /// The rows of `M_fr` into their blocks.
     #[inline(always)]
-    fn follow(
-        &mut self,
-        side: &crate::model::Attachment,
-        displacement: Vector6<f64>,
-        rate: Vector6<f64>,
-        rotation: &Matrix3<f64>,
-        omega: &Vector3<f64>,
-    ) {
-        self.frame = FramePose::displaced(side, &displacement);
-        self.rate = rate;
-        let jacobian = self.frame.jacobian();
-        let lever = self.frame.position - self.frame.interface();
-        self.turn = Matrix6::identity();
-        self.turn.fixed_view_mut::<3, 3>(0, 0).copy_from(&jacobian);
-        self.turn.fixed_view_mut::<3, 3>(3, 0).copy_from(&(-skew(&lever) * jacobian));
-        self.bias = self.frame.bias_of(&rate, &self.frame.position, omega);
-        let axes = rotation * self.frame.rotation;
-        let spin = rotation * (omega + jacobian * angular(&rate));
-        self.motion[..9].copy_from_slice(axes.as_slice());
-        self.motion[9..].copy_from_slice(spin.as_slice());
-    }
-
-    /// `S` and the force felt at O+ in B axes, its bias included.
-    #[inline(always)]
-    fn gather(&self, rotation: &Matrix3<f64>) -> (Matrix6<f64>, Vector6<f64>) {
-        let (inertia, force) = super::inward::plain(&self.felt);
-        let inertia = inertia.rotated(&rotation.transpose());
-        let felt = rotate_back(rotation, &force) + inertia.times(&self.bias);
-        (inertia.matrix(), felt)
-    }
-
-    /// `X = (T^-1 phi*)'`, unless the interface has turned to where its rotation vector is singular.
-    #[inline(always)]
-    fn reach(&self) -> Option<Matrix6<f64>> {
-        let jacobian = self.turn.fixed_view::<3, 3>(0, 0).into_owned();
-        let mut reach = Matrix6::identity();
-        reach.fixed_view_mut::<3, 3>(0, 0).copy_from(&jacobian.try_inverse()?.transpose());
-        // -interface~ transposed
-        reach.fixed_view_mut::<3, 3>(0, 3).copy_from(&skew(&self.frame.interface()));
-        Some(reach)
+    fn gather_rows(&mut self) {
+        for (block, rows) in self.rows.iter_mut().zip(self.inertia.row.chunks(4)) {
+            for (i, row) in rows.iter().enumerate() {
+                for c in 0..6 {
+                    block[c][i] = row[c];
+                }
+            }
+        }
     }
 }

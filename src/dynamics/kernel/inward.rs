@@ -2,6 +2,8 @@
 
 use super::hinge::external_force;
 use super::layout::Shape;
+use super::six::{Pair, Six};
+use super::tip::columns_of;
 use super::{Arm, Doubtful, Gain, NONE, Outboard, RECORD, TreeKernel, angular_velocity, arm, attitude, parent_motion};
 use crate::dynamics::sweep::inertia_inward::SINGULAR;
 use crate::model::{State, System};
@@ -39,8 +41,7 @@ pub fn inward<L: Lanes>(s: L, tree: &mut TreeKernel, system: &System, state: &St
         if let Some(own) = flexible.get_mut(link.flexible as usize) {
             let constants = &modal_shapes[own.shape];
             own.gather_loads(system, state);
-            let (inertia, force) = own.filter(s, constants)?;
-            felt.add(s, &numbers(&inertia, &force));
+            felt.join(s, &own.filter(s, constants)?);
         } else {
             felt.add_body(s, shape, turn, omega);
         }
@@ -151,7 +152,7 @@ impl<V: Copy> Felt<V> {
 
     /// From O to the origin of the parent, which lies at `-l`: `phi P phi*` and `phi z`.
     #[inline(always)]
-    fn shift<L: Lanes<V = V>>(&mut self, s: L, l: V) {
+    pub fn shift<L: Lanes<V = V>>(&mut self, s: L, l: V) {
         let turned = [s.yzx(l), s.zxy(l)];
         let lanes = [s.all_x(l), s.all_y(l), s.all_z(l)];
         // A = C + l~ L, A' = C' - L l~, J + l~ C' - A l~
@@ -162,6 +163,43 @@ impl<V: Copy> Felt<V> {
         self.coupled = take_right(s, self.translational, lanes, self.coupled);
         self.rotational = take_right(s, self.coupling, lanes, self.rotational);
         self.moment = s.add(self.moment, across(s, turned, self.force));
+    }
+
+    /// An inertia and force in axes that `rotation` turns into these.
+    #[inline(always)]
+    pub fn turned<L: Lanes<V = V>>(s: L, inertia: &Six, force: Pair<V>, rotation: &Matrix3<f64>) -> Self {
+        let (axes, mut out) = (columns_of(s, rotation), Self::none(s));
+        let (mut rotational, mut coupling, mut translational) = ([axes[0]; 3], [axes[0]; 3], [axes[0]; 3]);
+        for j in 0..3 {
+            rotational[j] = inertia.column(s, j)[0];
+            [coupling[j], translational[j]] = inertia.column(s, j + 3);
+        }
+        // R B R' column by column: the columns of B R' are B times the rows of R
+        for j in 0..3 {
+            let row = [rotation[(j, 0)], rotation[(j, 1)], rotation[(j, 2)]];
+            out.rotational[j] = s.combine(axes, s.combine_numbers(rotational, row));
+            out.coupling[j] = s.combine(axes, s.combine_numbers(coupling, row));
+            out.translational[j] = s.combine(axes, s.combine_numbers(translational, row));
+        }
+        let (x, y, z) = (s.three(out.coupling[0]), s.three(out.coupling[1]), s.three(out.coupling[2]));
+        for j in 0..3 {
+            out.coupled[j] = s.of_three([x[j], y[j], z[j]]);
+        }
+        (out.moment, out.force) = (s.combine(axes, force[0]), s.combine(axes, force[1]));
+        out
+    }
+
+    /// Adds another.
+    #[inline(always)]
+    fn join<L: Lanes<V = V>>(&mut self, s: L, other: &Self) {
+        for j in 0..3 {
+            self.rotational[j] = s.add(self.rotational[j], other.rotational[j]);
+            self.coupling[j] = s.add(self.coupling[j], other.coupling[j]);
+            self.coupled[j] = s.add(self.coupled[j], other.coupled[j]);
+            self.translational[j] = s.add(self.translational[j], other.translational[j]);
+        }
+        self.moment = s.add(self.moment, other.moment);
+        self.force = s.add(self.force, other.force);
     }
 
     /// Adds what a record holds.

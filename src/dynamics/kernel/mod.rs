@@ -28,6 +28,8 @@ mod layout;
 mod modal_shape;
 mod outward;
 mod rows;
+mod six;
+mod tip;
 
 use crate::model::{State, System};
 use crate::spatial::lanes::{Kernel, Lanes, Processor};

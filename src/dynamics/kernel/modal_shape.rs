@@ -1,11 +1,12 @@
 //! What of a flexible body never changes, shared by all bodies that are alike.
 
 use super::rows::{Block, blocks_of, gram};
+use super::six::Six;
 use crate::model::flexible_body::ModalIntegrals;
 use crate::model::{Attachment, FlexibleBody, InertiaOrder};
 use crate::spatial::SpatialInertia;
-use crate::spatial::lanes::Plain;
-use nalgebra::{Matrix3, Matrix6, Vector6};
+use crate::spatial::lanes::{Lanes, Plain};
+use nalgebra::{Matrix3, Vector6};
 use std::sync::Arc;
 
 /// Constants of a flexible body with the children that its modes move, all in the axes of its frame B.
@@ -23,12 +24,12 @@ pub struct ModalShape {
     pub stiffness: Vec<[f64; 4]>,
     /// 1/s.
     pub damping: Vec<[f64; 4]>,
-    /// `Phi Phi'` of all interfaces, 6 m x 6 m row by row.
-    pub flexibility: Vec<f64>,
+    /// `Phi Phi'` of all pairs of interfaces, row by row.
+    pub flexibility: Vec<Six>,
     /// `M_fr' Phi'` of every interface, undeformed.
-    pub coupling: Vec<Matrix6<f64>>,
+    pub coupling: Vec<Six>,
     /// Inertia of the undeformed body that its modes leave to B: `M_rr - M_fr' M_fr`.
-    pub residual: Matrix6<f64>,
+    pub residual: Six,
     /// Undeformed.
     pub rigid: SpatialInertia,
     source: Source,
@@ -75,25 +76,15 @@ impl ModalShape {
             }
         });
         let interfaces: Vec<Vec<Block<6>>> = children.iter().map(|a| blocks_of(n, |row, j| a.mode_shape[j][row])).collect();
-        let size = 6 * children.len();
-        let mut flexibility = vec![0.0; size * size];
-        for (a, left) in interfaces.iter().enumerate() {
-            for (b, right) in interfaces.iter().enumerate() {
-                let block = gram(Plain, left, right);
-                for i in 0..6 {
-                    for j in 0..6 {
-                        flexibility[(6 * a + i) * size + 6 * b + j] = block[(i, j)];
-                    }
-                }
-            }
-        }
+        let pairs = interfaces.iter().flat_map(|a| interfaces.iter().map(move |b| (a, b)));
+        let flexibility = pairs.map(|(a, b)| gram(Plain, a, b)).collect();
         let inertia = Matrix3::from_diagonal_element(of.second_moment.trace()) - of.second_moment;
         let rigid = SpatialInertia::rigid(of.mass, &of.first_moment, &((inertia + inertia.transpose()) * 0.5));
         Self {
             modes: n,
             order: body.order,
             coupling: interfaces.iter().map(|phi| gram(Plain, &rows, phi)).collect(),
-            residual: rigid.matrix() - gram(Plain, &rows, &rows),
+            residual: residual_of(Plain, &rigid, &rows),
             rigid,
             integrals,
             rows,
@@ -109,4 +100,14 @@ impl ModalShape {
             },
         }
     }
+}
+
+/// `M_rr - M_fr' M_fr`.
+#[inline(always)]
+pub fn residual_of<L: Lanes>(s: L, rigid: &SpatialInertia, rows: &[Block<6>]) -> Six {
+    let (mut out, carried) = (Six::from(rigid.matrix()), gram(s, rows, rows));
+    for (column, carried) in out.0.iter_mut().zip(&carried.0) {
+        column.iter_mut().zip(carried).for_each(|(x, c)| *x -= c);
+    }
+    out
 }
