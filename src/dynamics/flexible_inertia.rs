@@ -17,6 +17,7 @@
 #![expect(non_snake_case, reason = "symbols follow the table in dynamics/mod.rs")]
 
 use crate::model::flexible_body::{InertiaOrder, ModalIntegrals, TENSOR};
+use crate::model::mode_products::ProductSums;
 use crate::spatial::SpatialInertia;
 use crate::spatial::shift::{linear, spatial};
 use nalgebra::{Matrix3, Vector3, Vector6};
@@ -34,6 +35,8 @@ pub struct FlexibleInertia {
     pub row: Vec<Vector6<f64>>,
     /// Nine planes of n: `W_j,ab` at `(3 a + b) * n + j`.
     W: Vec<f64>,
+    /// What the n^2 integrals make of the modal coordinates and rates.
+    sums: ProductSums,
 }
 
 impl FlexibleInertia {
@@ -46,17 +49,17 @@ impl FlexibleInertia {
             inertia: Matrix3::zeros(),
             row: vec![Vector6::zeros(); n],
             W: vec![0.0; TENSOR * n],
+            sums: ProductSums::new(n),
         }
     }
 
-    /// Evaluates the inertia at the modal coordinates `eta`.
-    pub fn evaluate(&mut self, integrals: &ModalIntegrals, order: InertiaOrder, eta: &[f64]) {
+    /// Evaluates the inertia at the modal coordinates `eta`, and what [`Self::velocity_terms`] needs of the rates `eta_dot`.
+    pub fn evaluate(&mut self, integrals: &ModalIntegrals, order: InertiaOrder, eta: &[f64], eta_dot: &[f64]) {
         let n = integrals.mode_count();
         self.W.copy_from_slice(&integrals.shape_position);
         if order >= InertiaOrder::First {
-            for (w, p) in self.W.chunks_exact_mut(n.max(1)).zip(integrals.shape_shape.chunks_exact((n * n).max(1))) {
-                add_product(p, eta, w);
-            }
+            self.sums.multiply(&integrals.products, eta, eta_dot);
+            integrals.products.add_shapes(&self.sums, n, &mut self.W);
         }
         let mut first_moment = integrals.first_moment;
         let mut second_moment = integrals.second_moment;
@@ -97,7 +100,7 @@ impl FlexibleInertia {
         }
     }
 
-    /// Velocity terms for angular velocity `omega` (body axes) and modal rates: returns the rigid rows of b, writes the modal rows.
+    /// Velocity terms for angular velocity `omega` (body axes) and the modal rates that [`Self::evaluate`] had: returns the rigid rows of b, writes the modal rows.
     pub fn velocity_terms(
         &self,
         integrals: &ModalIntegrals,
@@ -123,12 +126,7 @@ impl FlexibleInertia {
             }
         }
         if order >= InertiaOrder::First {
-            for (c, plane) in integrals.shape_cross.chunks_exact((n * n).max(1)).enumerate() {
-                for (k, rate) in eta_dot.iter().enumerate() {
-                    let factor = 2.0 * omega[c] * rate;
-                    b_modal.iter_mut().zip(&plane[k * n..][..n]).for_each(|(o, p)| *o += factor * p);
-                }
-            }
+            integrals.products.add_coriolis(&self.sums, (omega * 2.0).into(), b_modal);
         }
         let mut b = spatial(&moment, &force);
         if order >= InertiaOrder::First {
@@ -143,12 +141,4 @@ impl FlexibleInertia {
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
-/// `out += P x` for a column-contiguous square plane.
-fn add_product(plane: &[f64], x: &[f64], out: &mut [f64]) {
-    let n = out.len();
-    for (column, x) in plane.chunks_exact(n.max(1)).zip(x) {
-        out.iter_mut().zip(column).for_each(|(o, p)| *o += p * x);
-    }
 }

@@ -1,6 +1,7 @@
 //! A flexible body as the recursion reads it: modal integrals packed for the sweeps, stiffness and damping resolved.
 
 use super::modal_body::{Interface, ModalBody};
+use super::mode_products::ModeProducts;
 use nalgebra::{DMatrix, Matrix3, Vector3, Vector6};
 use std::f64::consts::TAU;
 
@@ -39,14 +40,12 @@ pub struct ModalIntegrals {
     pub momentum: Vec<Vector3<f64>>,
     /// Nine planes of n: `int rho phi_ja r_b`.
     pub shape_position: Vec<f64>,
-    /// Nine planes of n x n, column k contiguous: `int rho phi_ja phi_kb` at `j + n * k`.
-    pub shape_shape: Vec<f64>,
-    /// Three planes of n x n, column k contiguous: `int rho (phi_k x phi_j)_c`, the Coriolis coupling of modal rates.
-    pub shape_cross: Vec<f64>,
+    /// `int rho phi_ja phi_kb` of all pairs of modes, with `int rho Gamma_jk,a r_b` of the geometric stiffness in `second_order`.
+    pub products: ModeProducts,
     /// Per mode, angular momentum of rotary inertia (kg^(1/2) m); empty without.
     pub rotary: Vec<Vector3<f64>>,
     /// Six planes of n x n, symmetric: `int rho (r x Gamma_jk)_c`, then `int rho Gamma_jk,c`, of the second-order displacement
-    /// `1/2 eta' Gamma eta` that geometric stiffness stands for; empty without. `shape_shape` holds its `int rho Gamma_jk,a r_b` too.
+    /// `1/2 eta' Gamma eta` that geometric stiffness stands for; empty without.
     pub second_order: Vec<f64>,
 }
 
@@ -54,34 +53,32 @@ impl ModalIntegrals {
     /// Packs the integrals of `body`, and its geometric stiffness where it has that.
     #[must_use]
     pub fn with_geometric_stiffness(body: &ModalBody) -> Self {
-        let mut packed = Self::of(body);
-        if let Some(matrices) = &body.geometric_stiffness {
-            packed.add_geometric_stiffness(matrices);
-        }
-        packed
+        Self::packed(body, body.geometric_stiffness.as_deref())
     }
 
     /// Adds the second-order displacement field whose work under the 12 unit inertial loads makes the geometric stiffness.
     ///
     /// A frame acceleration `a(r)` loads the body by `-rho a`, so `K = int rho a_b Gamma_b`: `K_acc,b = int rho Gamma_b`, and with
     /// `N_ab = int rho r_a Gamma_b`: `K_alpha,c = N_ab - N_ba` (abc cyclic), `K_omega,ab = N_ab + N_ba`, `K_omega,aa = N_aa - tr N`.
-    fn add_geometric_stiffness(&mut self, matrices: &[DMatrix<f64>]) {
-        let n = self.mode_count();
+    ///
+    /// Adds N to the nine planes of `shape_shape`, and returns the six of `second_order`.
+    fn add_geometric_stiffness(n: usize, matrices: &[DMatrix<f64>], shape_shape: &mut [f64]) -> Vec<f64> {
         let square = n * n;
         let at = |load: usize, i: usize| 0.5 * (matrices[load][(i % n, i / n)] + matrices[load][(i / n, i % n)]);
-        self.second_order = (0..6).map(|l| (l + 3) % 6).flat_map(|load| (0..square).map(move |i| at(load, i))).collect();
+        let second_order = (0..6).map(|l| (l + 3) % 6).flat_map(|load| (0..square).map(move |i| at(load, i))).collect();
         for i in 0..square {
             let squares = 0.5 * (at(6, i) + at(7, i) + at(8, i));
             for a in 0..3 {
-                self.shape_shape[4 * a * square + i] += at(6 + a, i) - squares;
+                shape_shape[4 * a * square + i] += at(6 + a, i) - squares;
             }
             for (c, product) in [(0, 10), (1, 11), (2, 9)] {
                 let (a, b) = ((c + 1) % 3, (c + 2) % 3);
                 // plane (b, a) takes Gamma_b r_a
-                self.shape_shape[(3 * b + a) * square + i] += 0.5 * (at(product, i) + at(3 + c, i));
-                self.shape_shape[(3 * a + b) * square + i] += 0.5 * (at(product, i) - at(3 + c, i));
+                shape_shape[(3 * b + a) * square + i] += 0.5 * (at(product, i) + at(3 + c, i));
+                shape_shape[(3 * a + b) * square + i] += 0.5 * (at(product, i) - at(3 + c, i));
             }
         }
+        second_order
     }
 
     /// True if geometric stiffness is in.
@@ -93,6 +90,10 @@ impl ModalIntegrals {
     /// Packs the integrals of `body` without its geometric stiffness.
     #[must_use]
     pub fn of(body: &ModalBody) -> Self {
+        Self::packed(body, None)
+    }
+
+    fn packed(body: &ModalBody, geometric_stiffness: Option<&[DMatrix<f64>]>) -> Self {
         let n = body.mode_count();
         let mut shape_position = vec![0.0; TENSOR * n];
         let mut shape_shape = vec![0.0; TENSOR * n * n];
@@ -115,6 +116,7 @@ impl ModalIntegrals {
                 shape_cross[c * square + i] = shape_shape[(3 * b + a) * square + i] - shape_shape[(3 * a + b) * square + i];
             }
         }
+        let second_order = geometric_stiffness.map_or_else(Vec::new, |m| Self::add_geometric_stiffness(n, m, &mut shape_shape));
         let cross_sum = |q: &Matrix3<f64>| Vector3::new(q[(1, 2)] - q[(2, 1)], q[(2, 0)] - q[(0, 2)], q[(0, 1)] - q[(1, 0)]);
         let rotary = body.angular_momentum.iter().flat_map(|l| l.iter().zip(&body.first_moment).map(|(l, q)| l - cross_sum(q))).collect();
         Self {
@@ -123,10 +125,9 @@ impl ModalIntegrals {
             second_moment: Matrix3::from_diagonal_element(0.5 * body.inertia.trace()) - body.inertia,
             momentum: body.momentum.clone(),
             shape_position,
-            shape_shape,
-            shape_cross,
+            products: ModeProducts::new(n, &shape_shape, &shape_cross, geometric_stiffness.is_some()),
             rotary,
-            second_order: Vec::new(),
+            second_order,
         }
     }
 

@@ -15,6 +15,7 @@ pub mod left_out;
 pub mod load;
 pub mod modal_body;
 pub mod mode_basis;
+pub mod mode_products;
 pub mod state;
 pub mod surface;
 pub mod time_function;

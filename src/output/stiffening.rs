@@ -93,12 +93,11 @@ fn inertial_load(omega: &Vector3<f64>, alpha: &Vector6<f64>) -> [f64; INERTIAL_L
 
 /// `(omega^2 - omega omega') : int rho phi_j phi_j'`.
 fn softening(flexible: &FlexibleBody, j: usize, omega: &Vector3<f64>) -> f64 {
-    let n = flexible.mode_count();
     let mut sum = 0.0;
     for a in 0..3 {
         for b in 0..3 {
             let factor = if a == b { omega.norm_squared() } else { 0.0 } - omega[a] * omega[b];
-            sum += factor * flexible.integrals.shape_shape[((3 * a + b) * n + j) * n + j];
+            sum += factor * flexible.integrals.products.diagonal(3 * a + b, j);
         }
     }
     sum

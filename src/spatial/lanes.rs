@@ -49,6 +49,14 @@ pub trait Lanes: Copy {
     /// The sums of the first three numbers of three registers.
     fn sums(self, a: [Self::V; 3]) -> Self::V;
 
+    /// The sums of all four numbers of four registers.
+    #[inline(always)]
+    fn sums_of_four(self, a: [Self::V; 4]) -> Self::V {
+        let ([a0, a1, a2, a3], [b0, b1, b2, b3]) = (self.store(a[0]), self.store(a[1]));
+        let ([c0, c1, c2, c3], [d0, d1, d2, d3]) = (self.store(a[2]), self.store(a[3]));
+        self.load([(a0 + a1) + (a2 + a3), (b0 + b1) + (b2 + b3), (c0 + c1) + (c2 + c3), (d0 + d1) + (d2 + d3)])
+    }
+
     /// `[x, y, z]`.
     #[inline(always)]
     fn three(self, a: Self::V) -> [f64; 3] {

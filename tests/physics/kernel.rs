@@ -182,6 +182,8 @@ fn time_per_body() {
             }
         }
         let [bare, loads, plain, sweeps] = best.map(|t| t * 1e9);
-        println!("{count:>7} bodies: {bare:.1} ns per body, {loads:.1} with loads, {plain:.1} with loads by plain instructions, {sweeps:.1} by the sweeps");
+        println!(
+            "{count:>7} bodies: {bare:.1} ns per body, {loads:.1} with loads, {plain:.1} with loads by plain instructions, {sweeps:.1} by the sweeps"
+        );
     }
 }

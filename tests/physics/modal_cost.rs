@@ -58,7 +58,9 @@ fn time_per_body(modes: usize, order: InertiaOrder) -> f64 {
 fn time_per_flexible_body() {
     // PLIANT_ORDER0: a loop to profile
     if std::env::var_os("PLIANT_ORDER0").is_some() {
-        (0..20).for_each(|_| { time_per_body(12, InertiaOrder::Zeroth); });
+        (0..20).for_each(|_| {
+            time_per_body(12, InertiaOrder::Zeroth);
+        });
         return;
     }
     for modes in [6, 12, 24, 48, 96] {

@@ -77,7 +77,7 @@ fn integrated(body: &LumpedBody, motion: &Motion, order: InertiaOrder) -> Terms 
 fn integrated_of(integrals: &ModalIntegrals, motion: &Motion, order: InertiaOrder) -> Terms {
     let n = motion.eta.len();
     let mut inertia = FlexibleInertia::new(n);
-    inertia.evaluate(integrals, order, &motion.eta);
+    inertia.evaluate(integrals, order, &motion.eta, &motion.eta_dot);
     let mut bias_modal = vec![0.0; n];
     let bias = inertia.velocity_terms(integrals, order, &motion.omega, &motion.eta_dot, &mut bias_modal);
     Terms { first_moment: inertia.first_moment, inertia: inertia.inertia, row: inertia.row.clone(), bias, bias_modal }
@@ -199,7 +199,7 @@ fn geometric_stiffness_gives_the_terms_of_the_second_order_displacements_of_node
 fn mass(integrals: &ModalIntegrals, eta: &[f64]) -> DMatrix<f64> {
     let n = eta.len();
     let mut inertia = FlexibleInertia::new(n);
-    inertia.evaluate(integrals, InertiaOrder::Second, eta);
+    inertia.evaluate(integrals, InertiaOrder::Second, eta, &vec![0.0; eta.len()]);
     let mut mass = DMatrix::identity(6 + n, 6 + n);
     mass.view_mut((0, 0), (6, 6)).copy_from(&inertia.rigid.matrix());
     for (j, row) in inertia.row.iter().enumerate() {

@@ -81,15 +81,19 @@ struct Deformed {
 
 impl FlexibleLink {
     /// Of body `body` with the constants `shape` (number `index`), whose link axes are `turn` in O axes.
-    pub fn new(system: &System, body: usize, flexible: &FlexibleBody, children: &[usize], shape: &ModalShape, index: usize, turn: &Matrix3<f64>) -> Self {
+    pub fn new(
+        system: &System,
+        body: usize,
+        flexible: &FlexibleBody,
+        children: &[usize],
+        shape: &ModalShape,
+        index: usize,
+        turn: &Matrix3<f64>,
+    ) -> Self {
         let (n, blocks, tips) = (shape.modes, block_count(shape.modes), children.len());
         let loaded = system.loads.iter().any(|l| l.body == body);
-        let deformed = || Deformed {
-            inertia: FlexibleInertia::new(n),
-            rows: shape.rows.clone(),
-            residual: Six::ZERO,
-            b_modal: vec![0.0; n],
-        };
+        let deformed =
+            || Deformed { inertia: FlexibleInertia::new(n), rows: shape.rows.clone(), residual: Six::ZERO, b_modal: vec![0.0; n] };
         Self {
             body,
             shape: index,
@@ -132,7 +136,7 @@ impl FlexibleLink {
         fill(eta, &mut self.position);
         fill(eta_dot, &mut self.rate);
         if let Some(now) = &mut self.deformed {
-            now.inertia.evaluate(&flexible.integrals, flexible.order, eta);
+            now.inertia.evaluate(&flexible.integrals, flexible.order, eta, eta_dot);
             self.b = now.inertia.velocity_terms(&flexible.integrals, flexible.order, &omega, eta_dot, &mut now.b_modal);
             fill(&now.b_modal, &mut self.r);
             self.r.iter_mut().flatten().for_each(|r| *r = -*r);

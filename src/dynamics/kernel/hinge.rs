@@ -1,7 +1,7 @@
 //! Hinges that are not plain revolute ones, prescribed ones, and external loads: in plain algebra, inertial axes.
 
-use super::layout::{Layout, NONE, Shape};
 use super::flexible::FlexibleLink;
+use super::layout::{Layout, NONE, Shape};
 use super::{Doubtful, Motion, carrier};
 use crate::dynamics::sweep::inertia_inward::{BodyInertia, eliminate_hinge, solve_hinge};
 use crate::model::hinge::{HingePose, MAX_RATES};
@@ -61,8 +61,8 @@ impl GeneralHinge {
     /// First pass: pose, map and bias; returns the motion of the body.
     pub fn follow(&mut self, system: &System, state: &State, shape: &Shape, parent: Option<&Motion>) -> Motion {
         let body = &system.bodies[self.body];
-        let (turn, omega) =
-            parent.map_or((Matrix3::identity(), Vector3::zeros()), |m| (Matrix3::from_column_slice(&m[..9]), Vector3::new(m[9], m[10], m[11])));
+        let (turn, omega) = parent
+            .map_or((Matrix3::identity(), Vector3::zeros()), |m| (Matrix3::from_column_slice(&m[..9]), Vector3::new(m[9], m[10], m[11])));
         let (q, v) = (&state.position[body.position_range()], &state.velocity[body.velocity_range()]);
         body.hinge.kind.pose(q, &mut self.pose);
         let outer = turn * Matrix3::from_column_slice(&shape.fixed);

@@ -114,7 +114,8 @@ impl Layout {
                 index(layout.shapes.len() - 1)
             });
             let is_rigid = body.flexible().is_none();
-            let load = if is_rigid && system.loads.binary_search_by_key(&k, |l| l.body).is_ok() { push(&mut layout.loaded, k) } else { NONE };
+            let load =
+                if is_rigid && system.loads.binary_search_by_key(&k, |l| l.body).is_ok() { push(&mut layout.loaded, k) } else { NONE };
             let mut link = Link {
                 parent: body.parent.map_or(NONE, index),
                 shape,

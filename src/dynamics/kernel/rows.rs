@@ -2,8 +2,8 @@
 //!
 //! `R` rows of n numbers lie as blocks of `R x 4`: a pass reads memory from front to back. What fills the last block is zero.
 
-use crate::spatial::lanes::Lanes;
 use super::six::{Pair, Six};
+use crate::spatial::lanes::Lanes;
 
 /// Four modes of each of `R` rows.
 pub type Block<const R: usize> = [[f64; 4]; R];

@@ -1,6 +1,6 @@
 //! Pose sweep: where every O stands on its parent, the hinge maps, and the mode shapes there.
 //!
-//! Reads: state positions. Writes: [`PoseScratch`]. Source: Paper Eq. 26 (operators), DESIGN 2 (finite rotation).
+//! Reads: state positions (and the modal rates, which the same pass over the modal integrals takes along). Writes: [`PoseScratch`]. Source: Paper Eq. 26 (operators), DESIGN 2 (finite rotation).
 //! Closures and aggregates follow at the end, from the poses of their bodies.
 //! Cost: O(bodies + modes), plus O(modes^2) per flexible body for its inertia.
 
@@ -125,7 +125,8 @@ pub fn pose_outward(system: &System, state: &State, out: &mut PoseScratch) {
     for (k, body) in system.bodies.iter().enumerate() {
         place(system, state, k, out);
         if let (BodyKind::Flexible(flexible), Some(index)) = (&body.kind, out.bodies[k].flexible) {
-            out.flexible[index].inertia.evaluate(&flexible.integrals, flexible.order, &state.modal_position[body.modal_range()]);
+            let (eta, eta_dot) = (&state.modal_position[body.modal_range()], &state.modal_velocity[body.modal_range()]);
+            out.flexible[index].inertia.evaluate(&flexible.integrals, flexible.order, eta, eta_dot);
         }
     }
     if !system.closures.is_empty() {
