@@ -1,10 +1,13 @@
 //! What the parts of one evaluation cost, measured at a state.
 
-use super::{DynamicsError, Workspace, closed_chain, forward_dynamics, sweep};
+use super::{DynamicsError, Workspace, accelerations, closed_chain, forward_dynamics, sweep};
 use crate::model::{State, System};
 use std::time::{Duration, Instant};
 
 /// Time (s) of the parts of one evaluation.
+///
+/// The kernel for trees ([`super::kernel`]) has three parts only: its first pass, poses with velocities, counts as poses, its second,
+/// inertias with forces, as inertias.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct EvaluationTime {
     /// Poses, maps, and inertias of the deformed bodies.
@@ -29,13 +32,16 @@ impl EvaluationTime {
     }
 }
 
-/// Times the sweeps at `state` one by one, each as often as fits into a share of `budget`, and gives the quickest of each.
+/// Times the sweeps, or the passes of the kernel, at `state` one by one, each as often as fits into a share of `budget`, and gives the quickest of each.
 ///
 /// # Errors
 /// [`DynamicsError`] if the evaluation has no answer.
 pub fn profile(system: &System, state: &State, budget: Duration) -> Result<EvaluationTime, DynamicsError> {
     let mut workspace = Workspace::new(system);
-    forward_dynamics(system, state, &mut workspace)?;
+    accelerations(system, state, &mut workspace)?;
+    if workspace.is_by_kernel() {
+        return profile_kernel(system, state, budget, &mut workspace);
+    }
     let Workspace { pose, velocity, inertia, force, acceleration, closed, .. } = &mut workspace;
     let share = budget / 6;
     let poses = quickest(share, || {
@@ -63,6 +69,22 @@ pub fn profile(system: &System, state: &State, budget: Duration) -> Result<Evalu
         time.closures = (whole - time.total()).max(0.0);
     }
     Ok(time)
+}
+
+/// The same by the passes of the kernel.
+fn profile_kernel(system: &System, state: &State, budget: Duration, workspace: &mut Workspace) -> Result<EvaluationTime, DynamicsError> {
+    let Workspace { tree, acceleration, .. } = workspace;
+    let mut times = [0.0; 3];
+    for (pass, time) in times.iter_mut().enumerate() {
+        *time = quickest(budget / 3, || {
+            if let Some(tree) = tree {
+                tree.repeat_pass(pass, system, state, &mut acceleration.hinge, &mut acceleration.modal);
+            }
+            Ok(())
+        })?;
+    }
+    let [poses, inertias, accelerations] = times;
+    Ok(EvaluationTime { poses, inertias, accelerations, ..EvaluationTime::default() })
 }
 
 /// Batches from which the quickest is taken, so that whatever else the machine does counts little.

@@ -163,6 +163,41 @@ fn turning_chain_accelerates_as_other_engines_say() {
 
 #[test]
 #[ignore = "prints times"]
+fn time_per_hinge_kind() {
+    for (kind, axes) in [
+        ("revolute", vec![[0.0, 0.6, 0.8]]),
+        ("fixed", vec![]),
+        ("prismatic", vec![[0.0, 1.0, 0.0]]),
+        ("universal", vec![[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]),
+        ("spherical", vec![]),
+        ("free", vec![]),
+    ] {
+        let links = (0..64).map(|k| rigid(&format!("link {k}"), 1.0, [0.25, 0.0, 0.0], [0.002, 0.022, 0.022])).collect();
+        let mut definition = chain(links, &[[0.5, 0.0, 0.0]; 63]);
+        for hinge in &mut definition.hinges {
+            (hinge.kind, hinge.axes) = (kind.into(), axes.iter().map(|&a| a.into()).collect());
+        }
+        let (system, state) = definition.build().unwrap();
+        let [mut by_kernel, mut swept] = [Workspace::new(&system), Workspace::new(&system)];
+        let mut best = [f64::INFINITY; 2];
+        for _ in 0..20 {
+            for (i, best) in best.iter_mut().enumerate() {
+                let start = Instant::now();
+                for _ in 0..500 {
+                    match i {
+                        0 => accelerations(&system, &state, &mut by_kernel).unwrap(),
+                        _ => forward_dynamics(&system, &state, &mut swept).unwrap(),
+                    }
+                }
+                *best = best.min(start.elapsed().as_secs_f64() / (500.0 * 64.0));
+            }
+        }
+        println!("{kind}: {:.1} ns per body, {:.1} by the sweeps", best[0] * 1e9, best[1] * 1e9);
+    }
+}
+
+#[test]
+#[ignore = "prints times"]
 fn time_per_body() {
     for count in [4, 16, 64, 256, 1_000, 10_000, 100_000] {
         let (system, state) = turning_chain(count);

@@ -1,5 +1,6 @@
 //! Third pass: accelerations and hinge loads, from the base to the tips. Source: Paper Eq. 13 and 18, in inertial axes.
 
+use super::layout::Passage;
 use super::{Branch, NONE, Outboard, TreeKernel, arm, parent_motion};
 use crate::dynamics::sweep::force_inward::world_acceleration;
 use crate::model::{State, System};
@@ -25,23 +26,30 @@ pub fn accelerate<L: Lanes>(s: L, tree: &mut TreeKernel, system: &System, state:
                 None => at_world,
             };
         }
-        if link.general == NONE {
+        if link.passage != Passage::General {
             let shape = &layout.shapes[link.shape as usize];
             let (turn, omega) = parent_motion(s, link, layout, motion, flexible);
             let m = &motion[k];
             let axis = s.load([m[6], m[7], m[8], m[9]]);
-            let at = arm(s, shape, turn, omega, axis, state.velocity[link.v as usize]);
+            let at = arm(s, link, shape, state, turn, omega, axis);
             // alpha+ = phi* alpha of the parent
             linear = s.sub(linear, s.cross(at.l, angular));
             if let Some(out) = outboard.get_mut(k) {
                 write_load(s, out, angular, linear);
             }
             (angular, linear) = (s.add(angular, at.angular), s.add(linear, at.linear));
-            let g = &gains[k];
-            let (gain_angular, gain_linear) = (s.load([g[0], g[1], g[2], g[3]]), s.load([g[3], g[4], g[5], g[6]]));
-            let acceleration = g[6] - s.dot_two(gain_angular, angular, gain_linear, linear);
-            hinge[link.v as usize] = acceleration;
-            angular = s.mul_add(axis, s.splat(acceleration), angular);
+            if link.passage != Passage::Fixed {
+                let g = &gains[k];
+                let (gain_angular, gain_linear) = (s.load([g[0], g[1], g[2], g[3]]), s.load([g[3], g[4], g[5], g[6]]));
+                let acceleration = g[6] - s.dot_two(gain_angular, angular, gain_linear, linear);
+                hinge[link.v as usize] = acceleration;
+                if link.passage == Passage::Revolute {
+                    angular = s.mul_add(axis, s.splat(acceleration), angular);
+                } else {
+                    angular = s.mul_add(axis, s.splat(shape.turn_rate * acceleration), angular);
+                    linear = s.mul_add(axis, s.splat(shape.travel_rate * acceleration), linear);
+                }
+            }
         } else {
             let own = &general[link.general as usize];
             linear = s.sub(linear, s.cross(s.of_three(own.l.into()), angular));

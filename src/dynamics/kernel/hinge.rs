@@ -1,7 +1,7 @@
-//! Hinges that are not plain revolute ones, prescribed ones, and external loads: in plain algebra, inertial axes.
+//! Hinges of several rates, prescribed ones, and external loads: in plain algebra, inertial axes.
 
 use super::flexible::FlexibleLink;
-use super::layout::{Layout, NONE, Shape};
+use super::layout::{Layout, Passage, Shape};
 use super::{Doubtful, Motion, carrier};
 use crate::dynamics::sweep::inertia_inward::{BodyInertia, eliminate_hinge, solve_hinge};
 use crate::model::hinge::{HingePose, MAX_RATES};
@@ -161,7 +161,14 @@ impl GeneralHinge {
 }
 
 /// Velocities of all O in inertial axes (m/s), and those of the frames of flexible bodies.
-pub fn velocities(layout: &Layout, motion: &[Motion], general: &[GeneralHinge], flexible: &mut [FlexibleLink], out: &mut [Vector3<f64>]) {
+pub fn velocities(
+    state: &State,
+    layout: &Layout,
+    motion: &[Motion],
+    general: &[GeneralHinge],
+    flexible: &mut [FlexibleLink],
+    out: &mut [Vector3<f64>],
+) {
     for (k, link) in layout.links.iter().enumerate() {
         let parent = carrier(link, layout, motion, flexible);
         let omega = parent.map_or_else(Vector3::zeros, |m| Vector3::new(m[9], m[10], m[11]));
@@ -169,12 +176,19 @@ pub fn velocities(layout: &Layout, motion: &[Motion], general: &[GeneralHinge], 
             None => out.get(link.parent as usize).copied().unwrap_or_default(),
             Some(&(body, tip)) => flexible[body as usize].tips[tip as usize].velocity,
         };
-        let (l, slide) = if link.general == NONE {
-            let turn = parent.map_or_else(Matrix3::identity, |m| Matrix3::from_column_slice(&m[..9]));
-            (turn * Vector3::from(layout.shapes[link.shape as usize].offset), Vector3::zeros())
-        } else {
+        let (l, slide) = if link.passage == Passage::General {
             let own = &general[link.general as usize];
             (own.l, linear(&own.relative))
+        } else {
+            let (turn, shape) = (parent.map_or_else(Matrix3::identity, |m| Matrix3::from_column_slice(&m[..9])), &layout.shapes[link.shape as usize]);
+            let offset = turn * Vector3::from(shape.offset);
+            match link.passage {
+                Passage::Slide => {
+                    let travel = Vector3::new(motion[k][6], motion[k][7], motion[k][8]) * shape.travel_rate;
+                    (offset + travel * state.position[link.q as usize], travel * state.velocity[link.v as usize])
+                }
+                _ => (offset, Vector3::zeros()),
+            }
         };
         out[k] = base + omega.cross(&l) + slide;
         if let Some(own) = flexible.get_mut(link.flexible as usize) {

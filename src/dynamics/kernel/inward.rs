@@ -1,10 +1,10 @@
 //! Second pass: articulated inertias and residual forces, from the tips to the base. Source: Paper Eq. 9 to 12, in inertial axes.
 
 use super::hinge::external_force;
-use super::layout::Shape;
+use super::layout::{Passage, Shape};
 use super::six::{Pair, Six};
 use super::tip::columns_of;
-use super::{Arm, Doubtful, Gain, NONE, Outboard, RECORD, TreeKernel, angular_velocity, arm, attitude, parent_motion};
+use super::{Arm, Doubtful, Gain, Outboard, RECORD, TreeKernel, angular_velocity, arm, attitude, parent_motion};
 use crate::dynamics::sweep::inertia_inward::SINGULAR;
 use crate::model::{State, System};
 use crate::spatial::SpatialInertia;
@@ -51,17 +51,21 @@ pub fn inward<L: Lanes>(s: L, tree: &mut TreeKernel, system: &System, state: &St
             felt.force = s.sub(felt.force, s.of_three([load[3], load[4], load[5]]));
         }
 
-        let l = if link.general == NONE {
-            let (parent_turn, parent_omega) = parent_motion(s, link, layout, motion, flexible);
-            let at = arm(s, shape, parent_turn, parent_omega, turn[2], state.velocity[link.v as usize]);
-            gains[k] = felt.pass_revolute(s, turn[2], link.applied(system, state, layout), &at)?;
-            at.l
-        } else {
+        let l = if link.passage == Passage::General {
             let own = &mut general[link.general as usize];
             let (inertia, force) = felt.plain(s);
             let (inertia, force) = own.filter(system, state, &inertia, &force)?;
             felt = Felt::of_plain(s, &inertia, &force);
             s.of_three(own.l.into())
+        } else {
+            let (parent_turn, parent_omega) = parent_motion(s, link, layout, motion, flexible);
+            let at = arm(s, link, shape, state, parent_turn, parent_omega, turn[2]);
+            match link.passage {
+                Passage::Revolute => gains[k] = felt.pass_revolute(s, turn[2], link.applied(system, state, layout), &at)?,
+                Passage::Slide => gains[k] = felt.pass_slide(s, turn[2], shape, link.applied(system, state, layout), &at)?,
+                Passage::Fixed | Passage::General => felt.take_bias(s, &at, [s.splat(0.0); 2]),
+            }
+            at.l
         };
         if let Some(out) = outboard.get_mut(k) {
             felt.write(s, out);
@@ -125,14 +129,33 @@ impl<V: Copy> Felt<V> {
         // P H*, D and its inverse
         let (angular, linear) = (s.combine(self.rotational, axis), s.combine(self.coupled, axis));
         let pivot = s.dot(axis, angular);
-        let ([a, ..], [_, b, _], [_, _, c]) = (s.three(self.rotational[0]), s.three(self.rotational[1]), s.three(self.rotational[2]));
-        if !(pivot > SINGULAR * (a + b + c) && pivot >= f64::MIN_POSITIVE) {
+        if !(pivot > SINGULAR * trace(s, self.rotational) && pivot >= f64::MIN_POSITIVE) {
             return Err(Doubtful);
         }
-        let inverse = 1.0 / pivot;
-        let nu = (applied - s.dot(axis, self.moment)) * inverse;
+        Ok(self.pass(s, [angular, linear], 1.0 / pivot, applied - s.dot(axis, self.moment), at))
+    }
+
+    /// The same through a hinge that travels along `axis`, and turns about it or not.
+    #[inline(always)]
+    fn pass_slide<L: Lanes<V = V>>(&mut self, s: L, axis: V, shape: &Shape, applied: f64, at: &Arm<V>) -> Result<Gain, Doubtful> {
+        let (turn, travel) = (s.mul(axis, s.splat(shape.turn_rate)), s.mul(axis, s.splat(shape.travel_rate)));
+        let angular = s.combine_add(self.coupling, travel, s.combine(self.rotational, turn));
+        let linear = s.combine_add(self.translational, travel, s.combine(self.coupled, turn));
+        let pivot = s.dot_two(turn, angular, travel, linear);
+        let size = shape.turn_rate * shape.turn_rate * trace(s, self.rotational)
+            + shape.travel_rate * shape.travel_rate * trace(s, self.translational);
+        if !(pivot > SINGULAR * size && pivot >= f64::MIN_POSITIVE) {
+            return Err(Doubtful);
+        }
+        let epsilon = applied - s.dot_two(turn, self.moment, travel, self.force);
+        Ok(self.pass(s, [angular, linear], 1.0 / pivot, epsilon, at))
+    }
+
+    /// `P+ = P - G D G*` and `z+ = z + G epsilon + P+ a`, with `P H*` and the inverse of D at hand.
+    #[inline(always)]
+    fn pass<L: Lanes<V = V>>(&mut self, s: L, [angular, linear]: Pair<V>, inverse: f64, epsilon: f64, at: &Arm<V>) -> Gain {
+        let nu = epsilon * inverse;
         let (gain_angular, gain_linear) = (s.mul(angular, s.splat(inverse)), s.mul(linear, s.splat(inverse)));
-        // P+ = P - G D G*
         let by_angular = [s.all_x(gain_angular), s.all_y(gain_angular), s.all_z(gain_angular)];
         let by_linear = [s.all_x(gain_linear), s.all_y(gain_linear), s.all_z(gain_linear)];
         for j in 0..3 {
@@ -141,13 +164,18 @@ impl<V: Copy> Felt<V> {
             self.coupling[j] = s.mul_take(angular, by_linear[j], self.coupling[j]);
             self.translational[j] = s.mul_take(linear, by_linear[j], self.translational[j]);
         }
-        // z+ = z + P+ a + P H* nu
-        let moment = s.combine_add(self.rotational, at.angular, s.mul_add(angular, s.splat(nu), self.moment));
-        let force = s.combine_add(self.coupled, at.angular, s.mul_add(linear, s.splat(nu), self.force));
+        self.take_bias(s, at, [s.mul(angular, s.splat(nu)), s.mul(linear, s.splat(nu))]);
+        let ([gx, gy, gz], [fx, fy, fz]) = (s.three(gain_angular), s.three(gain_linear));
+        [gx, gy, gz, fx, fy, fz, nu, 0.0]
+    }
+
+    /// `z <- z + added + P a`.
+    #[inline(always)]
+    fn take_bias<L: Lanes<V = V>>(&mut self, s: L, at: &Arm<V>, added: Pair<V>) {
+        let moment = s.combine_add(self.rotational, at.angular, s.add(self.moment, added[0]));
+        let force = s.combine_add(self.coupled, at.angular, s.add(self.force, added[1]));
         self.moment = s.combine_add(self.coupling, at.linear, moment);
         self.force = s.combine_add(self.translational, at.linear, force);
-        let ([gx, gy, gz], [fx, fy, fz]) = (s.three(gain_angular), s.three(gain_linear));
-        Ok([gx, gy, gz, fx, fy, fz, nu, 0.0])
     }
 
     /// From O to the origin of the parent, which lies at `-l`: `phi P phi*` and `phi z`.
@@ -261,6 +289,13 @@ fn put<L: Lanes>(s: L, a: L::V, out: &mut Outboard, at: usize) {
     out[at + 1] = x[1];
     out[at + 2] = x[2];
     out[at + 3] = x[3];
+}
+
+/// Trace of a block.
+#[inline(always)]
+fn trace<L: Lanes>(s: L, block: [L::V; 3]) -> f64 {
+    let (a, b, c) = (s.three(block[0]), s.three(block[1]), s.three(block[2]));
+    (a[0] + b[1]) + c[2]
 }
 
 /// `l x b` of an arm whose permutations (y, z, x) and (z, x, y) are at hand.

@@ -23,6 +23,22 @@ pub struct Shape {
     pub inertia: [f64; 9],
     /// Link axes to O axes.
     pub turn: Matrix3<f64>,
+    /// Turn (rad) and travel (m) along the third axis per unit of the coordinate of a hinge of one rate.
+    pub turn_rate: f64,
+    pub travel_rate: f64,
+}
+
+/// How the passes take a hinge.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Passage {
+    /// One angle.
+    Revolute,
+    /// One coordinate that travels, and turns or not.
+    Slide,
+    /// No rate.
+    Fixed,
+    /// Anything else, and prescribed hinges.
+    General,
 }
 
 /// One body with its hinge.
@@ -34,9 +50,11 @@ pub struct Link {
     pub shape: u32,
     /// Index in `TreeKernel::branches`, or [`NONE`].
     pub branch: u32,
-    /// Index in `TreeKernel::general`, [`NONE`] for a revolute hinge.
+    /// What its hinge is.
+    pub passage: Passage,
+    /// Index in `TreeKernel::general`, [`NONE`] for the other passages.
     pub general: u32,
-    /// Index in [`Layout::drives`], or [`NONE`] for a revolute hinge with nothing but a constant torque.
+    /// Index in [`Layout::drives`], or [`NONE`] for a hinge with nothing but a constant force.
     pub drive: u32,
     /// Index in [`Layout::loaded`], or [`NONE`].
     pub load: u32,
@@ -48,20 +66,20 @@ pub struct Link {
     pub q: u32,
     /// First rate.
     pub v: u32,
-    /// Constant torque of a revolute hinge (N m).
-    pub torque: f64,
+    /// Constant force on the one rate (N m or N).
+    pub force: f64,
 }
 
-/// Spring, damper and motor of a revolute hinge.
+/// Spring, damper and motor of a hinge of one rate.
 #[derive(Debug, Clone, Copy)]
 pub struct Drive {
-    /// N m/rad.
+    /// N m/rad or N/m.
     pub stiffness: f64,
-    /// N m s/rad.
+    /// N m s/rad or N s/m.
     pub damping: f64,
-    /// Angle at which the spring is at rest (rad).
+    /// Coordinate at which the spring is at rest (rad or m).
     pub rest: f64,
-    /// Body whose hinge has a torque that varies, or [`NONE`].
+    /// Body whose hinge has a force that varies, or [`NONE`].
     pub motor: u32,
 }
 
@@ -72,7 +90,7 @@ pub struct Layout {
     pub links: Vec<Link>,
     /// Every distinct shape.
     pub shapes: Vec<Shape>,
-    /// Those of revolute hinges that have more than a constant torque.
+    /// Those of hinges that have more than a constant force.
     pub drives: Vec<Drive>,
     /// Bodies with a hinge of any other kind.
     pub general: Vec<usize>,
@@ -105,7 +123,7 @@ impl Layout {
             tips: vec![],
             branches: 0,
         };
-        let mut known: HashMap<[u64; 34], u32> = HashMap::new();
+        let mut known: HashMap<[u64; 36], u32> = HashMap::new();
         for (k, body) in system.bodies.iter().enumerate() {
             let parent_turn = body.parent.map_or_else(Matrix3::identity, |p| layout.shapes[layout.links[p].shape as usize].turn);
             let shape = Shape::new(body, body.parent.map(|p| &system.bodies[p]), &parent_turn);
@@ -120,6 +138,7 @@ impl Layout {
                 parent: body.parent.map_or(NONE, index),
                 shape,
                 branch: NONE,
+                passage: passage_of(body),
                 general: NONE,
                 drive: NONE,
                 load,
@@ -127,14 +146,16 @@ impl Layout {
                 tip: NONE,
                 q: index(body.position),
                 v: index(body.velocity),
-                torque: 0.0,
+                force: 0.0,
             };
-            if revolute_axis(body).is_some() {
-                let (drive, torque) = drive_of(k, body);
-                link.torque = torque;
-                link.drive = drive.map_or(NONE, |d| push(&mut layout.drives, d));
-            } else {
-                link.general = push(&mut layout.general, k);
+            match link.passage {
+                Passage::General => link.general = push(&mut layout.general, k),
+                Passage::Fixed => {}
+                Passage::Revolute | Passage::Slide => {
+                    let (drive, force) = drive_of(k, body);
+                    link.force = force;
+                    link.drive = drive.map_or(NONE, |d| push(&mut layout.drives, d));
+                }
             }
             if let Some(parent) = body.parent.filter(|_| body.parent_side.moves()) {
                 let at = layout.links[parent].flexible;
@@ -165,15 +186,28 @@ fn push<T>(list: &mut Vec<T>, item: T) -> u32 {
     index(list.len() - 1)
 }
 
-/// Axis of a revolute hinge that no function prescribes.
-fn revolute_axis(body: &Body) -> Option<&Vector3<f64>> {
+fn passage_of(body: &Body) -> Passage {
     match &body.hinge.kind {
-        HingeKind::Revolute { axis } if !body.hinge.is_prescribed() => Some(axis),
+        _ if body.hinge.is_prescribed() => Passage::General,
+        HingeKind::Fixed => Passage::Fixed,
+        HingeKind::Revolute { .. } => Passage::Revolute,
+        HingeKind::Prismatic { .. } | HingeKind::Screw { .. } => Passage::Slide,
+        _ => Passage::General,
+    }
+}
+
+/// Axis of a hinge of one rate that no function prescribes, and its turn and travel per unit of the coordinate.
+fn single_axis(body: &Body) -> Option<(&Vector3<f64>, f64, f64)> {
+    match &body.hinge.kind {
+        _ if body.hinge.is_prescribed() => None,
+        HingeKind::Revolute { axis } => Some((axis, 1.0, 0.0)),
+        HingeKind::Prismatic { axis } => Some((axis, 0.0, 1.0)),
+        HingeKind::Screw { axis, pitch } => Some((axis, 1.0, *pitch)),
         _ => None,
     }
 }
 
-/// What acts on the revolute hinge of body `k`, and its constant torque (N m).
+/// What acts on the hinge of one rate of body `k`, and its constant force.
 fn drive_of(k: usize, body: &Body) -> (Option<Drive>, f64) {
     let first = |list: &[f64]| list.first().copied().unwrap_or(0.0);
     let hinge = &body.hinge;
@@ -212,7 +246,8 @@ fn turn_to(axis: &Vector3<f64>) -> Matrix3<f64> {
 impl Shape {
     /// Of `body` on `parent`, whose link axes are `parent_turn` in its O axes.
     fn new(body: &Body, parent: Option<&Body>, parent_turn: &Matrix3<f64>) -> Self {
-        let turn = revolute_axis(body).map_or_else(Matrix3::identity, turn_to);
+        let single = single_axis(body);
+        let turn = single.map_or_else(Matrix3::identity, |(axis, ..)| turn_to(axis));
         let side = &body.parent_side;
         let (mut outer, mut position) = (side.rotation * side.offset_rotation, side.position + side.rotation * side.offset);
         if side.moves() {
@@ -235,13 +270,15 @@ impl Shape {
             mass: if body.flexible().is_some() { 0.0 } else { body.mass() },
             inertia: column((rotational + rotational.transpose()) * 0.5),
             turn,
+            turn_rate: single.map_or(0.0, |s| s.1),
+            travel_rate: single.map_or(0.0, |s| s.2),
         }
     }
 
-    fn bits(&self) -> [u64; 34] {
+    fn bits(&self) -> [u64; 36] {
         let numbers = self.fixed.iter().chain(&self.offset).chain(&self.first_moment).chain(&self.inertia);
-        let mut bits = [0; 34];
-        for (bit, number) in bits.iter_mut().zip(numbers.chain([&self.mass]).chain(self.turn.iter())) {
+        let mut bits = [0; 36];
+        for (bit, number) in bits.iter_mut().zip(numbers.chain([&self.mass, &self.turn_rate, &self.travel_rate]).chain(self.turn.iter())) {
             *bit = number.to_bits();
         }
         bits
@@ -249,18 +286,18 @@ impl Shape {
 }
 
 impl Link {
-    /// Torque of the motor of a revolute hinge (N m).
+    /// Force of the motor of a hinge of one rate (N m or N).
     #[inline]
     pub fn motor(&self, system: &System, state: &State, layout: &Layout) -> f64 {
         let varying = layout.drives.get(self.drive as usize).and_then(|d| system.bodies.get(d.motor as usize));
-        self.torque + varying.and_then(|b| b.hinge.torque.as_ref()).map_or(0.0, |f| f.value(state.time, 0))
+        self.force + varying.and_then(|b| b.hinge.torque.as_ref()).map_or(0.0, |f| f.value(state.time, 0))
     }
 
-    /// Torque of motor, spring and damper of a revolute hinge (N m).
+    /// Force of motor, spring and damper on the one rate (N m or N).
     #[inline(always)]
     pub fn applied(&self, system: &System, state: &State, layout: &Layout) -> f64 {
         match layout.drives.get(self.drive as usize) {
-            None => self.torque,
+            None => self.force,
             Some(d) => {
                 let (q, v) = (state.position[self.q as usize], state.velocity[self.v as usize]);
                 let spring = if d.stiffness == 0.0 { 0.0 } else { d.stiffness * (q - d.rest) };

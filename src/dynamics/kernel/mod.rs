@@ -18,7 +18,7 @@
 //! in the caches. Bodies that are alike share their constants. A child that follows its parent in the order, as in every chain, finds the
 //! parent's quantities in registers; only branching bodies keep theirs in memory.
 //!
-//! Axes: "link axes" are those of O, turned so that the axis of a revolute hinge is their third. Registers: [`crate::spatial::lanes`].
+//! Axes: "link axes" are those of O, turned so that the axis of a hinge of one rate is their third. Registers: [`crate::spatial::lanes`].
 
 mod accelerate;
 mod flexible;
@@ -36,14 +36,14 @@ use crate::spatial::lanes::{Kernel, Lanes, Processor};
 use crate::spatial::shift::spatial;
 use flexible::FlexibleLink;
 use hinge::GeneralHinge;
-use layout::{Layout, Link, NONE, Shape};
+use layout::{Layout, Link, NONE, Passage, Shape};
 use modal_shape::ModalShape;
 use nalgebra::{Matrix3, Vector3, Vector6};
 
 /// Attitude (three columns: link axes to inertial axes) and angular velocity (inertial axes) of one body.
 pub(super) type Motion = [f64; 12];
 
-/// `G = P H* / D` (angular; linear) and `nu` of a revolute hinge, inertial axes at O.
+/// `G = P H* / D` (angular; linear) and `nu` of a hinge of one rate, inertial axes at O.
 pub(super) type Gain = [f64; 8];
 
 /// Numbers of an [`Outboard`]; the last three fill up.
@@ -120,7 +120,13 @@ impl TreeKernel {
 
     /// Accelerations of all hinge rates and modal coordinates at `state`, into `hinge` and `modal`.
     pub(super) fn evaluate(&mut self, system: &System, state: &State, hinge: &mut [f64], modal: &mut [f64]) -> Result<(), Doubtful> {
-        self.processor.run(Evaluation { tree: self, system, state, hinge, modal })
+        self.processor.run(Evaluation { tree: self, system, state, hinge, modal, passes: [true; 3] })
+    }
+
+    /// One of the three passes alone, at a state that was evaluated before: for measuring it. What it leaves is of no other use.
+    pub(super) fn repeat_pass(&mut self, pass: usize, system: &System, state: &State, hinge: &mut [f64], modal: &mut [f64]) {
+        let passes = std::array::from_fn(|i| i == pass);
+        let _ = self.processor.run(Evaluation { tree: self, system, state, hinge, modal, passes });
     }
 
     /// True if evaluations leave hinge loads.
@@ -143,9 +149,9 @@ impl TreeKernel {
     pub fn power(&self, system: &System, state: &State) -> f64 {
         let mut total = 0.0;
         for link in &self.layout.links {
-            if link.general != NONE {
+            if link.passage == Passage::General {
                 total += self.general[link.general as usize].power(system, state, |k| self.hinge_load(k));
-            } else {
+            } else if link.passage != Passage::Fixed {
                 let v = state.velocity[link.v as usize];
                 let damping = self.layout.drives.get(link.drive as usize).map_or(0.0, |d| d.damping);
                 total += v * (link.motor(system, state, &self.layout) - damping * v);
@@ -184,6 +190,7 @@ struct Evaluation<'a> {
     state: &'a State,
     hinge: &'a mut [f64],
     modal: &'a mut [f64],
+    passes: [bool; 3],
 }
 
 impl Kernel for Evaluation<'_> {
@@ -191,10 +198,16 @@ impl Kernel for Evaluation<'_> {
 
     #[inline(always)]
     fn run<L: Lanes>(self, lanes: L) -> Result<(), Doubtful> {
-        let Self { tree, system, state, hinge, modal } = self;
-        outward::outward(lanes, tree, system, state);
-        inward::inward(lanes, tree, system, state)?;
-        accelerate::accelerate(lanes, tree, system, state, hinge, modal);
+        let Self { tree, system, state, hinge, modal, passes } = self;
+        if passes[0] {
+            outward::outward(lanes, tree, system, state);
+        }
+        if passes[1] {
+            inward::inward(lanes, tree, system, state)?;
+        }
+        if passes[2] {
+            accelerate::accelerate(lanes, tree, system, state, hinge, modal);
+        }
         Ok(())
     }
 }
@@ -217,7 +230,7 @@ fn no_turn<L: Lanes>(s: L) -> [L::V; 3] {
     [s.load([1.0, 0.0, 0.0, 0.0]), s.load([0.0, 1.0, 0.0, 0.0]), s.load([0.0, 0.0, 1.0, 0.0])]
 }
 
-/// What the motion of the parent makes of the hinge of a link with a revolute hinge.
+/// What the motion of the parent makes of a hinge of at most one rate.
 struct Arm<V> {
     /// O of the parent to O of the link.
     l: V,
@@ -227,12 +240,24 @@ struct Arm<V> {
     linear: V,
 }
 
-/// Arm and bias of a revolute hinge about `axis` that turns at `rate`.
+/// Arm and bias of such a hinge about or along `axis`.
 #[inline(always)]
-fn arm<L: Lanes>(s: L, shape: &Shape, parent: [L::V; 3], omega: L::V, axis: L::V, rate: f64) -> Arm<L::V> {
+fn arm<L: Lanes>(s: L, link: &Link, shape: &Shape, state: &State, parent: [L::V; 3], omega: L::V, axis: L::V) -> Arm<L::V> {
     let l = s.combine_numbers(parent, shape.offset);
-    let angular = s.cross(omega, s.mul(axis, s.splat(rate)));
-    Arm { l, angular, linear: s.cross(omega, s.cross(omega, l)) }
+    match link.passage {
+        Passage::Revolute => {
+            let angular = s.cross(omega, s.mul(axis, s.splat(state.velocity[link.v as usize])));
+            Arm { l, angular, linear: s.cross(omega, s.cross(omega, l)) }
+        }
+        Passage::Slide => {
+            let (q, v) = (state.position[link.q as usize], state.velocity[link.v as usize]);
+            let l = s.mul_add(axis, s.splat(shape.travel_rate * q), l);
+            let angular = s.cross(omega, s.mul(axis, s.splat(shape.turn_rate * v)));
+            let slide = s.mul(axis, s.splat(2.0 * shape.travel_rate * v));
+            Arm { l, angular, linear: s.cross(omega, s.add(s.cross(omega, l), slide)) }
+        }
+        Passage::Fixed | Passage::General => Arm { l, angular: s.splat(0.0), linear: s.cross(omega, s.cross(omega, l)) },
+    }
 }
 
 /// Attitude and angular velocity of what carries `link`: its parent, or the frame on the parent that modes move.

@@ -1,6 +1,6 @@
 //! First pass: attitude and angular velocity of every body, from the base to the tips. Source: Paper Eq. 8, in inertial axes.
 
-use super::layout::Shape;
+use super::layout::{Passage, Shape};
 use super::{Motion, NONE, TreeKernel, angular_velocity, attitude, carrier, no_turn, parent_motion};
 use crate::model::{State, System};
 use crate::spatial::lanes::Lanes;
@@ -15,16 +15,25 @@ pub fn outward<L: Lanes>(s: L, tree: &mut TreeKernel, system: &System, state: &S
             (turn, omega) = parent_motion(s, link, layout, motion, flexible);
         }
         let shape = &layout.shapes[link.shape as usize];
-        if link.general == NONE {
-            let (q, v) = (state.position[link.q as usize], state.velocity[link.v as usize]);
-            turn = turned(s, shape, turn, q);
-            omega = s.mul_add(turn[2], s.splat(v), omega);
-            motion[k] = record(s, turn, omega);
-        } else {
+        if link.passage == Passage::General {
             let own = &mut general[link.general as usize];
             let parent = carrier(link, layout, motion, flexible).copied();
             motion[k] = own.follow(system, state, shape, parent.as_ref());
             (turn, omega) = (attitude(s, &motion[k]), angular_velocity(s, &motion[k]));
+        } else {
+            turn = fixed(s, shape, turn);
+            match link.passage {
+                Passage::Revolute => {
+                    turn = turned(s, turn, state.position[link.q as usize]);
+                    omega = s.mul_add(turn[2], s.splat(state.velocity[link.v as usize]), omega);
+                }
+                Passage::Slide if shape.turn_rate != 0.0 => {
+                    turn = turned(s, turn, shape.turn_rate * state.position[link.q as usize]);
+                    omega = s.mul_add(turn[2], s.splat(shape.turn_rate * state.velocity[link.v as usize]), omega);
+                }
+                _ => {}
+            }
+            motion[k] = record(s, turn, omega);
         }
         if let Some(own) = flexible.get_mut(link.flexible as usize) {
             let constants = &modal_shapes[own.shape];
@@ -33,18 +42,25 @@ pub fn outward<L: Lanes>(s: L, tree: &mut TreeKernel, system: &System, state: &S
         last = u32::try_from(k).unwrap_or(NONE);
     }
     if !velocity.is_empty() {
-        super::hinge::velocities(layout, motion, general, flexible, velocity);
+        super::hinge::velocities(state, layout, motion, general, flexible, velocity);
     }
 }
 
-/// Attitude past a revolute hinge at the angle `q` (rad).
+/// Attitude of the link axes with the hinge at zero.
 #[inline(always)]
-fn turned<L: Lanes>(s: L, shape: &Shape, parent: [L::V; 3], q: f64) -> [L::V; 3] {
+fn fixed<L: Lanes>(s: L, shape: &Shape, parent: [L::V; 3]) -> [L::V; 3] {
     let f = &shape.fixed;
-    let x = s.combine_numbers(parent, [f[0], f[1], f[2]]);
-    let y = s.combine_numbers(parent, [f[3], f[4], f[5]]);
-    let z = s.combine_numbers(parent, [f[6], f[7], f[8]]);
-    let (sine, cosine) = q.sin_cos();
+    [
+        s.combine_numbers(parent, [f[0], f[1], f[2]]),
+        s.combine_numbers(parent, [f[3], f[4], f[5]]),
+        s.combine_numbers(parent, [f[6], f[7], f[8]]),
+    ]
+}
+
+/// The same after a turn by `angle` (rad) about the third axis.
+#[inline(always)]
+fn turned<L: Lanes>(s: L, [x, y, z]: [L::V; 3], angle: f64) -> [L::V; 3] {
+    let (sine, cosine) = angle.sin_cos();
     let (sine, cosine) = (s.splat(sine), s.splat(cosine));
     [s.mul_add(x, cosine, s.mul(y, sine)), s.mul_take(x, sine, s.mul(y, cosine)), z]
 }
