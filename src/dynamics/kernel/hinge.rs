@@ -3,7 +3,7 @@
 use super::flexible::FlexibleLink;
 use super::layout::{Layout, Passage, Shape};
 use super::{Doubtful, Motion, carrier};
-use crate::dynamics::sweep::inertia_inward::{BodyInertia, eliminate_hinge, solve_hinge};
+use crate::dynamics::sweep::inertia_inward::{BodyInertia, SINGULAR, eliminate_hinge, solve_hinge};
 use crate::model::hinge::{HingePose, MAX_RATES};
 use crate::model::{HingeKind, LoadAxes, LoadPoint, State, System};
 use crate::spatial::SpatialInertia;
@@ -104,6 +104,9 @@ impl GeneralHinge {
     ) -> Result<(SpatialInertia, Vector6<f64>), Doubtful> {
         let body = &system.bodies[self.body];
         let m = body.hinge.kind.rate_count();
+        if matches!(body.hinge.kind, HingeKind::Free) && !body.hinge.is_prescribed() {
+            return self.release(system, state, inertia, force);
+        }
         self.inertia.P_hinge = *inertia;
         eliminate_hinge(body, &self.map, None, &mut self.inertia, |_| f64::INFINITY).map_err(|_| Doubtful)?;
         let applied = &mut self.applied[..m];
@@ -119,12 +122,40 @@ impl GeneralHinge {
             z += self.inertia.G[i] * epsilon;
         }
         solve_hinge(&self.inertia.D, &mut self.nu[..m]);
-        if matches!(body.hinge.kind, HingeKind::Free) {
-            // the hinge transmits what acts on its rates and nothing else
-            let felt = Vector6::from_iterator(applied.iter().copied());
-            return Ok((left, spatial(&(self.rotation * angular(&felt)), &(self.rotation * linear(&felt)))));
-        }
         Ok((left, z + left.times(&self.bias)))
+    }
+
+    /// The same through a free hinge, which transmits what acts on its rates and nothing else. Its map H is a rotation of both halves, so
+    /// that `G = H` and `nu = H* P^-1 (H applied - z)`.
+    fn release(
+        &mut self,
+        system: &System,
+        state: &State,
+        inertia: &SpatialInertia,
+        force: &Vector6<f64>,
+    ) -> Result<(SpatialInertia, Vector6<f64>), Doubtful> {
+        let body = &system.bodies[self.body];
+        body.hinge.applied_force(
+            state.time,
+            &state.position[body.position_range()],
+            &state.velocity[body.velocity_range()],
+            &mut self.applied,
+        );
+        let felt = Vector6::from(self.applied);
+        let felt = spatial(&(self.rotation * angular(&felt)), &(self.rotation * linear(&felt)));
+        let factor = inertia.matrix().cholesky().ok_or(Doubtful)?;
+        let sizes = [inertia.rotational.trace(), inertia.translational.trace()];
+        let pivots = factor.l_dirty().diagonal();
+        let sound = |(i, root): (usize, &f64)| root * root > SINGULAR * sizes[i / 3] && root * root >= f64::MIN_POSITIVE;
+        if !pivots.iter().enumerate().all(sound) {
+            return Err(Doubtful);
+        }
+        let free = factor.solve(&(felt - force));
+        for i in 0..MAX_RATES {
+            self.inertia.G[i] = self.map[i];
+            self.nu[i] = self.map[i].dot(&free);
+        }
+        Ok((SpatialInertia::default(), felt))
     }
 
     /// Third pass: the body's acceleration from that of O+ at O; writes the accelerations of the rates.
@@ -180,7 +211,8 @@ pub fn velocities(
             let own = &general[link.general as usize];
             (own.l, linear(&own.relative))
         } else {
-            let (turn, shape) = (parent.map_or_else(Matrix3::identity, |m| Matrix3::from_column_slice(&m[..9])), &layout.shapes[link.shape as usize]);
+            let (turn, shape) =
+                (parent.map_or_else(Matrix3::identity, |m| Matrix3::from_column_slice(&m[..9])), &layout.shapes[link.shape as usize]);
             let offset = turn * Vector3::from(shape.offset);
             match link.passage {
                 Passage::Slide => {
