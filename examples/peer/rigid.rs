@@ -1,0 +1,81 @@
+//! Rigid models: `fd` (accelerations of all hinges) and `fdf` (those and the six-component load of every hinge).
+//!
+//! The check is the sum of the absolute accelerations of the revolute hinges. Ops that answer numbers: `accelerations` of the revolute
+//! hinges and `loads` of all hinges (moment about O; force; by the parent on the child, in the child's axes), in the order of the links;
+//! `condition`: that of the mass matrix, by the dense twin of the recursion.
+
+use crate::links::Model;
+use crate::protocol::Case;
+use nalgebra::Vector6;
+use pliant::dynamics::hinge_load::hinge_loads;
+use pliant::dynamics::{Workspace, dense, forward_dynamics};
+use pliant::model::{State, System};
+use std::error::Error;
+
+/// One model and its last evaluation.
+pub struct Rigid {
+    system: System,
+    state: State,
+    workspace: Workspace,
+    loads: Vec<Vector6<f64>>,
+    /// Rate of the last hinge.
+    last: f64,
+}
+
+impl Rigid {
+    /// The model `name` of `n` links.
+    ///
+    /// # Errors
+    /// If there is none.
+    pub fn build(name: &str, n: usize) -> Result<Option<Self>, Box<dyn Error>> {
+        let (system, state) = Model::of(name, n)?.definition().build()?;
+        let (workspace, loads) = (Workspace::new(&system), vec![Vector6::zeros(); system.bodies.len()]);
+        let last = state.velocity.last().copied().ok_or("a model without hinges")?;
+        Ok(Some(Self { system, state, workspace, loads, last }))
+    }
+
+    fn accelerations(&self) -> impl Iterator<Item = f64> {
+        let revolute = |k: &&usize| self.system.bodies[**k].velocity_range().len() == 1;
+        let order = self.system.definition_order.iter().filter(revolute);
+        order.map(|&k| self.workspace.acceleration.hinge[self.system.bodies[k].velocity])
+    }
+}
+
+impl Case for Rigid {
+    fn call(&mut self, op: &str, call: u32) -> Result<bool, Box<dyn Error>> {
+        if op != "fd" && op != "fdf" {
+            return Ok(false);
+        }
+        if let Some(rate) = self.state.velocity.last_mut() {
+            *rate = self.last + 1e-12 * f64::from(call);
+        }
+        forward_dynamics(&self.system, &self.state, &mut self.workspace)?;
+        if op == "fdf" {
+            hinge_loads(&self.system, &self.workspace, &mut self.loads);
+            std::hint::black_box(&self.loads);
+        }
+        Ok(true)
+    }
+
+    fn check(&self) -> f64 {
+        self.accelerations().map(f64::abs).sum()
+    }
+
+    fn numbers(&mut self, op: &str) -> Result<Option<Vec<f64>>, Box<dyn Error>> {
+        match op {
+            "accelerations" => {
+                self.call("fd", 0)?;
+                Ok(Some(self.accelerations().collect()))
+            }
+            "loads" => {
+                self.call("fdf", 0)?;
+                Ok(Some(self.system.definition_order.iter().flat_map(|&k| self.loads[k].iter().copied().collect::<Vec<_>>()).collect()))
+            }
+            "condition" => {
+                let values = dense::equations(&self.system, &self.state).mass.symmetric_eigenvalues();
+                Ok(Some(vec![values.max() / values.min()]))
+            }
+            _ => Ok(None),
+        }
+    }
+}
