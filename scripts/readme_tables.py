@@ -130,15 +130,6 @@ def stability_table():
     return re.sub(r"(?<=\d)e0\b", "", "\n".join(lines))
 
 
-def cost_table():
-    """Cost per body as the scaling test prints it."""
-    done = physics_test("cost_of_an_evaluation")
-    found = re.search(r"(\d+) ns per body of 1e3, (\d+) ns per body of 1e4", done.stdout)
-    if not found:
-        sys.exit(f"the scaling test printed no figures: {done.stdout}{done.stderr}")
-    return f"| chain of rigid links | ns per body and evaluation |\n| --- | --- |\n| 1,000 | {found[1]} |\n| 10,000 | {found[2]} |"
-
-
 def loops_table():
     """Cost of cut and embedded loops as their test prints it."""
     done = physics_test("embedding_costs")
@@ -206,11 +197,23 @@ def residual_table():
 TABLES = {
     "validation": validation_table,
     "stability": stability_table,
-    "cost": cost_table,
     "loops": loops_table,
     "study": study_table,
     "residual": residual_table,
 }
+
+
+def put_tables(tables, script="scripts/readme_tables.py"):
+    """Puts Markdown tables, by name, between the markers of README.md that name the script."""
+    readme = ROOT / "README.md"
+    text = readme.read_text()
+    for name, table in tables.items():
+        begin, end = f"<!-- {name}: written by {script} -->", f"<!-- end of {name} -->"
+        if begin not in text:
+            sys.exit(f"README.md has no marker {begin}")
+        head, rest = text.split(begin)
+        text = head + begin + "\n" + table + "\n" + end + rest.split(end, 1)[1]
+        readme.write_text(text)
 
 
 def main():
@@ -219,15 +222,7 @@ def main():
     names = parser.parse_args().tables or list(TABLES)
     if unknown := set(names) - set(TABLES):
         parser.error(f"unknown table {unknown.pop()}; known: {', '.join(TABLES)}")
-    readme = ROOT / "README.md"
-    text = readme.read_text()
-    for name in names:
-        begin, end = f"<!-- {name}: written by scripts/readme_tables.py -->", f"<!-- end of {name} -->"
-        if begin not in text:
-            sys.exit(f"README.md has no marker {begin}")
-        head, rest = text.split(begin)
-        text = head + begin + "\n" + TABLES[name]() + "\n" + end + rest.split(end, 1)[1]
-    readme.write_text(text)
+    put_tables({name: TABLES[name]() for name in names})
 
 
 if __name__ == "__main__":
