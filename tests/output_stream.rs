@@ -319,16 +319,15 @@ fn a_killed_run_leaves_a_readable_file() -> Tested {
     let (file, left) = (folder.path().join("run.h5"), folder.path().join("left.h5"));
     let series = [("time", None), ("a/pair", Some(2))].map(|(path, width)| SeriesSpec { path: path.into(), width, attributes: vec![] });
     let mut results = ResultsFile::create(&file, &Preface::default(), &series)?;
-    for i in 0..BLOCK_ROWS + 7 {
-        let t = i as f64;
-        results.push([t, 2.0 * t, 3.0 * t])?;
-    }
+    let rows = |from: usize, to: usize| (from..to).map(|i| i as f64).flat_map(|t| [t, 2.0 * t, 3.0 * t]).collect::<Vec<_>>();
+    results.append(&rows(0, BLOCK_ROWS))?;
     std::fs::copy(&file, &left)?;
     let read = hdf5::File::open(&left)?;
     assert_eq!(read.dataset("time")?.shape(), [BLOCK_ROWS]);
     assert_eq!(read.dataset("a/pair")?.read_2d::<f64>()?[(BLOCK_ROWS - 1, 1)], 3.0 * (BLOCK_ROWS - 1) as f64);
     assert!(read.attr("completed").is_err());
     drop(read);
+    results.append(&rows(BLOCK_ROWS, BLOCK_ROWS + 7))?;
     assert_eq!(results.finish(false, 70.0)?, BLOCK_ROWS as u64 + 7);
     let whole = hdf5::File::open(&file)?;
     assert_eq!(whole.attr("completed")?.read_scalar::<u8>()?, 0);

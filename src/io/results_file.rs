@@ -1,16 +1,17 @@
 //! Results files: time histories by name in HDF5, schema `pliant-results` 1.0. The layer above says what is in them.
 //!
-//! Every series is a dataset with one row per output time. Rows are kept in memory and appended in blocks; after each block the file
-//! is flushed, so that a run that is killed leaves a readable file with all but the last rows. Texts are of fixed length.
+//! Every series is a dataset with one row per output time. Rows are appended in blocks; after each block the file is flushed, so that a
+//! run that is killed leaves a readable file with all but the last rows. Texts are of fixed length.
 
 use super::error::ModalFileError;
 use super::guard::GuardedFile;
 use hdf5::types::{FixedUnicode, TypeDescriptor};
 use hdf5::{Dataset, Extent, Group, Location, SimpleExtents};
+use ndarray::ArrayView2;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
-/// Rows per block, which is also the chunk length.
+/// Rows per chunk, and so of the blocks that cost least.
 pub const BLOCK_ROWS: usize = 64;
 /// Longest text attribute (bytes).
 const TEXT_LIMIT: usize = 4096;
@@ -45,6 +46,14 @@ pub enum ResultsError {
         /// What is wrong.
         cause: String,
     },
+}
+
+impl ResultsError {
+    /// Output times that are in the file.
+    #[must_use]
+    pub fn rows(&self) -> u64 {
+        if let Self::Write { rows, .. } = self { *rows } else { 0 }
+    }
 }
 
 /// One time history.
@@ -88,8 +97,8 @@ pub struct ResultsFile {
     series: Vec<(Dataset, Option<usize>)>,
     /// Numbers per output time of all series together.
     row: usize,
-    buffer: Vec<f64>,
-    column: Vec<f64>,
+    /// One series of a block.
+    columns: Vec<f64>,
     written: usize,
 }
 
@@ -116,15 +125,7 @@ impl ResultsFile {
         };
         let (file, datasets) = made().map_err(|e| fail(e.to_string()))?;
         let row = series.iter().map(|s| s.width.unwrap_or(1)).sum();
-        Ok(Self {
-            path: path.to_owned(),
-            file,
-            series: datasets,
-            row,
-            buffer: Vec::with_capacity(row * BLOCK_ROWS),
-            column: Vec::with_capacity(BLOCK_ROWS),
-            written: 0,
-        })
+        Ok(Self { path: path.to_owned(), file, series: datasets, row, columns: Vec::new(), written: 0 })
     }
 
     /// The path as given.
@@ -139,67 +140,53 @@ impl ResultsFile {
         self.written as u64
     }
 
-    /// Takes one row: the numbers of all series in their order.
-    ///
-    /// # Errors
-    /// If the row completes a block and the block cannot be written.
-    pub fn push(&mut self, row: impl IntoIterator<Item = f64>) -> Result<(), ResultsError> {
-        let start = self.buffer.len();
-        self.buffer.extend(row);
-        debug_assert_eq!(self.buffer.len() - start, self.row, "a row has one number per column");
-        self.buffer.resize(start + self.row, f64::NAN);
-        if self.buffer.len() >= self.row * BLOCK_ROWS { self.flush() } else { Ok(()) }
-    }
-
-    /// Appends what is buffered and brings the file up to date.
+    /// Appends rows, one after the other, each with the numbers of all series in their order, and brings the file up to date. Blocks of
+    /// [`BLOCK_ROWS`] fill chunks and cost least.
     ///
     /// # Errors
     /// If a write fails.
-    pub fn flush(&mut self) -> Result<(), ResultsError> {
-        let result = self.append();
-        self.buffer.clear();
-        result.map_err(|e| self.failed(&e))
+    pub fn append(&mut self, rows: &[f64]) -> Result<(), ResultsError> {
+        self.write_rows(rows).map_err(|e| self.failed(&e))
     }
 
     fn failed(&self, error: &hdf5::Error) -> ResultsError {
         ResultsError::Write { file: self.path.clone(), rows: self.rows(), cause: error.to_string() }
     }
 
-    fn append(&mut self) -> hdf5::Result<()> {
-        let rows = self.buffer.len().checked_div(self.row).unwrap_or(0);
+    fn write_rows(&mut self, block: &[f64]) -> hdf5::Result<()> {
+        let rows = block.len().checked_div(self.row).unwrap_or(0);
         if rows == 0 {
             return Ok(());
         }
         let end = self.written + rows;
         let mut offset = 0;
         for (dataset, width) in &self.series {
+            let count = width.unwrap_or(1);
+            self.columns.clear();
+            self.columns.extend(block.chunks_exact(self.row).flat_map(|row| &row[offset..offset + count]));
             match *width {
                 None => {
-                    self.column.clear();
-                    self.column.extend(self.buffer.chunks_exact(self.row).map(|row| row[offset]));
                     dataset.resize(end)?;
-                    dataset.write_slice(self.column.as_slice(), self.written..end)?;
+                    dataset.write_slice(self.columns.as_slice(), self.written..end)?;
                 }
                 Some(width) => {
                     dataset.resize((end, width))?;
-                    for (i, row) in self.buffer.chunks_exact(self.row).enumerate() {
-                        dataset.write_slice(&row[offset..offset + width], (self.written + i, ..))?;
-                    }
+                    let values = ArrayView2::from_shape((rows, width), &self.columns).map_err(|e| hdf5::Error::from(e.to_string()))?;
+                    dataset.write_slice(values, (self.written..end, ..))?;
                 }
             }
-            offset += width.unwrap_or(1);
+            offset += count;
         }
         self.file.flush()?;
         self.written = end;
         Ok(())
     }
 
-    /// Writes the last rows and how the run ended, and closes the file.
+    /// Writes how the run ended and closes the file; returns the number of rows.
     ///
     /// # Errors
     /// If a write fails.
-    pub fn finish(mut self, completed: bool, end_time: f64) -> Result<u64, ResultsError> {
-        self.flush()?;
+    pub fn finish(self, completed: bool, end_time: f64) -> Result<u64, ResultsError> {
         let ended = || -> hdf5::Result<()> {
             self.file.new_attr::<u8>().create("completed")?.write_scalar(&u8::from(completed))?;
             self.file.new_attr::<f64>().create("end_time")?.write_scalar(&end_time)?;

@@ -1,6 +1,7 @@
-//! The results file of a run: `channels` laid out as HDF5 paths, one row per output time.
+//! The results file of a run: `channels` laid out as HDF5 paths, one row per output time, written by a thread of its own.
 //!
-//! The order of [`ResultsWriter::write`] is that of [`result_channels`]; a test holds the two together.
+//! The order of [`ResultsWriter::write`] is that of [`result_channels`]; a test holds the two together. Rows are handed over in blocks
+//! through a bounded channel: the solver waits if the disk is that slow, and nothing is dropped.
 
 use super::channels::{Channel, result_channels};
 use super::frame::OutputFrame;
@@ -8,57 +9,75 @@ use super::load_pose::{closure_pose, hinge_pose};
 use super::plan::OutputPlan;
 use crate::dynamics::world::WorldFrame;
 use crate::integrate::Sample;
-use crate::io::results_file::{Preface, ResultsError, ResultsFile, SeriesSpec, escape};
+use crate::io::results_file::{BLOCK_ROWS, Preface, ResultsError, ResultsFile, SeriesSpec, escape};
 use crate::model::System;
 use crate::spatial::rotation::quaternion_of_matrix;
+use crossbeam_channel::{Receiver, Sender, bounded};
 use nalgebra::Vector6;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::thread::JoinHandle;
 
 /// Name of the schema.
 pub const FORMAT: &str = "pliant-results";
 /// Version of the schema.
 pub const VERSION: &str = "1.0";
 
+/// Memory (bytes) for blocks on their way to the thread; one more is being filled and one being written.
+const ROOM: usize = 32 << 20;
+
 /// Writes one results file.
 #[derive(Debug)]
 pub struct ResultsWriter {
-    file: ResultsFile,
-    row: Vec<f64>,
+    path: PathBuf,
+    /// Numbers per output time.
+    width: usize,
+    /// Rows that are not yet handed over.
+    block: Vec<f64>,
+    sender: Sender<Vec<f64>>,
+    /// Blocks that were written, to be filled again.
+    written: Receiver<Vec<f64>>,
+    thread: JoinHandle<Result<ResultsFile, ResultsError>>,
     /// Last quaternion of every pose in the order of the row: of the two that mean the same, the one nearer to the last is written.
     quaternions: Vec<[f64; 4]>,
 }
 
 impl ResultsWriter {
-    /// Makes the file with its attributes, the scene and empty series.
+    /// Makes the file with its attributes, the scene and empty series, and starts the thread.
     ///
     /// # Errors
-    /// If the file cannot be made.
+    /// If the file cannot be made, or the system gives no thread.
     pub fn create(path: &Path, system: &System, plan: &OutputPlan) -> Result<Self, ResultsError> {
         let series: Vec<_> = result_channels(system, plan).iter().map(series_of).collect();
-        let file = ResultsFile::create(path, &preface(plan), &series)?;
-        Ok(Self { file, row: Vec::new(), quaternions: Vec::new() })
+        let width: usize = series.iter().map(|s| s.width.unwrap_or(1)).sum();
+        let mut file = ResultsFile::create(path, &preface(plan), &series)?;
+        let in_flight = ROOM / (size_of::<f64>() * width.max(1) * BLOCK_ROWS);
+        let (sender, receiver) = bounded::<Vec<f64>>(in_flight);
+        let (returned, written) = bounded(in_flight + 1);
+        let work = move || {
+            for block in receiver {
+                file.append(&block)?;
+                // the run keeps no room for more blocks than are in use
+                let _ = returned.try_send(block);
+            }
+            Ok(file)
+        };
+        let thread = std::thread::Builder::new().name("results".into()).spawn(work);
+        let thread = thread.map_err(|e| ResultsError::Create { file: path.to_owned(), cause: e.to_string() })?;
+        Ok(Self { path: path.to_owned(), width, block: Vec::new(), sender, written, thread, quaternions: Vec::new() })
     }
 
     /// The path as given.
     #[must_use]
     pub fn path(&self) -> &Path {
-        self.file.path()
+        &self.path
     }
 
-    /// Rows that are in the file.
+    /// Takes one output time. False if the thread could not write what it was given before; [`Self::finish`] says why.
     #[must_use]
-    pub fn rows(&self) -> u64 {
-        self.file.rows()
-    }
-
-    /// Takes one output time.
-    ///
-    /// # Errors
-    /// If the file cannot be written.
-    pub fn write(&mut self, plan: &OutputPlan, sample: &Sample<'_>, frame: &OutputFrame) -> Result<(), ResultsError> {
+    pub fn write(&mut self, plan: &OutputPlan, sample: &Sample<'_>, frame: &OutputFrame) -> bool {
         let Sample { system, state, workspace, work, .. } = *sample;
-        let row = &mut self.row;
-        row.clear();
+        let row = &mut self.block;
+        let start = row.len();
         let mut poses = 0;
         let mut pose = |row: &mut Vec<f64>, frame: &WorldFrame| {
             if poses == self.quaternions.len() {
@@ -107,15 +126,28 @@ impl ResultsWriter {
         }
         row.extend([frame.energy.kinetic, frame.energy.strain, frame.energy.potential, work]);
         row.extend(frame.audit.map(|audit| audit.load));
-        self.file.push(row.drain(..))
+        debug_assert_eq!(row.len() - start, self.width, "a row has one number per column");
+        row.resize(start + self.width, f64::NAN);
+        if row.len() < self.width * BLOCK_ROWS {
+            return true;
+        }
+        let next = self.written.try_recv().unwrap_or_else(|_| Vec::with_capacity(self.width * BLOCK_ROWS));
+        let full = std::mem::replace(&mut self.block, next);
+        self.block.clear();
+        self.sender.send(full).is_ok()
     }
 
-    /// Writes the last rows and how the run ended; returns the number of rows.
+    /// Waits until all rows are in the file and writes how the run ended; returns the number of rows.
     ///
     /// # Errors
     /// If the file cannot be written.
     pub fn finish(self, completed: bool, end_time: f64) -> Result<u64, ResultsError> {
-        self.file.finish(completed, end_time)
+        let Self { path, block, sender, thread, .. } = self;
+        drop(sender);
+        let ended = thread.join();
+        let mut file = ended.unwrap_or_else(|_| Err(ResultsError::Write { file: path, rows: 0, cause: "its thread ended".into() }))?;
+        file.append(&block)?;
+        file.finish(completed, end_time)
     }
 }
 

@@ -140,10 +140,7 @@ impl<'s> OutputSet<'s> {
     #[cfg(feature = "hdf5")]
     fn finish_results(&mut self, summary: &Summary) {
         if let Some(results) = self.results.take() {
-            let (target, before) = (results.path().display().to_string(), results.rows());
-            let finished = results.finish(summary.outcome == Outcome::Completed, summary.time);
-            let frames = finished.as_ref().copied().unwrap_or(before);
-            self.written.push(Written { kind: "results", target, frames, problem: finished.err().map(|e| e.to_string()) });
+            self.written.push(close_results(results, summary.outcome == Outcome::Completed, summary.time));
         }
     }
 
@@ -159,6 +156,17 @@ impl<'s> OutputSet<'s> {
             }
         }
     }
+}
+
+/// Waits until the file is whole, or says why it is not.
+#[cfg(feature = "hdf5")]
+fn close_results(results: ResultsWriter, completed: bool, end_time: f64) -> Written {
+    let target = results.path().display().to_string();
+    let (frames, problem) = match results.finish(completed, end_time) {
+        Ok(rows) => (rows, None),
+        Err(error) => (error.rows(), Some(error.to_string())),
+    };
+    Written { kind: "results", target, frames, problem }
 }
 
 /// Time spent at the end of a run on measuring an evaluation.
@@ -204,11 +212,10 @@ impl Observer for OutputSet<'_> {
         }
         #[cfg(feature = "hdf5")]
         if let Some(results) = &mut self.results
-            && let Err(error) = results.write(&self.plan, sample, frame)
+            && !results.write(&self.plan, sample, frame)
+            && let Some(results) = self.results.take()
         {
-            let (target, frames) = (results.path().display().to_string(), results.rows());
-            self.written.push(Written { kind: "results", target, frames, problem: Some(error.to_string()) });
-            self.results = None;
+            self.written.push(close_results(results, false, sample.state.time));
         }
         if let Some(viewer) = &mut self.viewer {
             let snapshot = Snapshot::of(viewer.hinges(), viewer.closures(), sample, frame, &self.tracker.events);
