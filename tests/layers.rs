@@ -11,7 +11,7 @@ const CONFINED: [(&str, &[&str]); 9] = [
     ("plotters", &["src/study/plot.rs"]),
     ("hdf5::", &["src/io/"]),
     ("quick_xml", &["src/io/"]),
-    ("rerun::", &["src/output/rerun.rs"]),
+    ("rerun::", &["src/output/rerun/"]),
     ("clap", &["src/cli/"]),
     ("indicatif", &["src/cli/"]),
     ("println!", &["src/cli/"]),

@@ -168,6 +168,19 @@ impl Picture {
     }
 }
 
+impl Picture {
+    /// Memory (bytes) of a snapshot without events.
+    #[must_use]
+    pub fn snapshot_bytes(&self) -> usize {
+        let modes = self.bodies.last().map_or(0, |b| b.modes.end);
+        size_of::<Snapshot>()
+            + self.bodies.len() * size_of::<([f64; 3], [f64; 4])>()
+            + self.hinges.len() * size_of::<LoadSnapshot>()
+            + self.closures.len() * size_of::<ClosureSnapshot>()
+            + modes * size_of::<f64>()
+    }
+}
+
 fn body_picture(plan: &OutputPlan, k: usize, body: &Body) -> BodyPicture {
     let shape = match &body.kind {
         BodyKind::Flexible(_) => None,

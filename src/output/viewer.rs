@@ -1,7 +1,7 @@
 //! Where a viewer stream goes, what can be wrong with it, and the thread behind a bounded channel that feeds it.
 //!
-//! The solver hands over small snapshots. If the viewer is too slow it waits for room, at most [`PATIENCE`]; after that the stream is
-//! given up, the run goes on and the report says so. Nothing waits without bound: ports are probed before anything connects, and closing
+//! The solver hands over small snapshots, which wait in memory of bounded size. If the viewer is so slow that it fills up, the solver waits
+//! for room, at most [`PATIENCE`]; after that the stream is given up, the run goes on and the report says so. Nothing waits without bound: ports are probed before anything connects, and closing
 //! has a time limit.
 
 use super::picture::Snapshot;
@@ -24,8 +24,13 @@ const CLOSING: Duration = Duration::from_secs(30);
 const PROBE: Duration = Duration::from_secs(2);
 /// How long a viewer may take to start (s).
 const START: Duration = Duration::from_secs(20);
-/// Output times on their way to the thread.
-const IN_FLIGHT: usize = 16;
+/// Memory (bytes) for snapshots on their way to the thread.
+const ROOM: usize = 32 << 20;
+/// Batches that it is divided into: waking the thread costs the solver more than a snapshot.
+const BATCHES: usize = 64;
+/// Most snapshots in a batch, and how long the first of them waits for the others: less than a picture of a screen.
+const BATCH: usize = 64;
+const HAND_OVER: Duration = Duration::from_millis(8);
 
 /// Where the stream goes.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -145,7 +150,7 @@ pub struct ViewerSummary {
 
 /// What the thread does with snapshots.
 pub trait FrameLog: Send + 'static {
-    /// Logs one output time.
+    /// Logs one output time, now or at the next [`Self::flush`].
     ///
     /// # Errors
     /// What went wrong, in words.
@@ -155,6 +160,13 @@ pub trait FrameLog: Send + 'static {
     /// # Errors
     /// As [`Self::frame`].
     fn note(&mut self, time: f64, text: &str) -> Result<(), String>;
+    /// How long [`Self::frame`] may hold an output time back to pass it on with others.
+    fn patience(&self) -> Duration;
+    /// Passes on what [`Self::frame`] holds back.
+    ///
+    /// # Errors
+    /// As [`Self::frame`].
+    fn flush(&mut self) -> Result<(), String>;
     /// Brings everything to file or viewer.
     ///
     /// # Errors
@@ -162,8 +174,9 @@ pub trait FrameLog: Send + 'static {
     fn close(self) -> Result<(), String>;
 }
 
+#[derive(Debug)]
 enum Message {
-    Frame(Box<Snapshot>),
+    Frame(Snapshot),
     Note(f64, String),
 }
 
@@ -174,7 +187,11 @@ pub struct ViewerStream {
     remedy: &'static str,
     hinges: Vec<usize>,
     closures: Vec<usize>,
-    sender: Option<Sender<Message>>,
+    sender: Option<Sender<Vec<Message>>>,
+    /// Messages that are not yet handed over, since when, and how many there may be.
+    batch: Vec<Message>,
+    since: Instant,
+    most: usize,
     done: Receiver<(u64, Result<(), String>)>,
     sent: u64,
     lost: Option<ViewerError>,
@@ -182,7 +199,7 @@ pub struct ViewerStream {
 
 impl ViewerStream {
     /// Starts the thread. `remedy` is what to do if the stream is lost; `log` shows the loads of the hinges that carry the bodies `hinges`,
-    /// and those of `closures`.
+    /// and those of `closures`; a snapshot takes `snapshot_bytes`.
     ///
     /// # Errors
     /// If the system gives no thread.
@@ -192,22 +209,22 @@ impl ViewerStream {
         remedy: &'static str,
         hinges: Vec<usize>,
         closures: Vec<usize>,
+        snapshot_bytes: usize,
     ) -> Result<Self, ViewerError> {
-        let (sender, receiver) = bounded::<Message>(IN_FLIGHT);
+        let most = (ROOM / BATCHES / snapshot_bytes.max(1)).clamp(1, BATCH);
+        // snapshots so large that single ones fill the room: a few all the same
+        let (sender, receiver) = bounded::<Vec<Message>>((ROOM / (most * snapshot_bytes.max(1))).clamp(4, BATCHES));
         let (finished, done) = bounded(1);
         let work = move || {
             let mut frames = 0;
-            let fed = receiver.iter().try_for_each(|message| match message {
-                Message::Frame(snapshot) => log.frame(&snapshot).map(|()| frames += 1),
-                Message::Note(time, text) => log.note(time, &text),
-            });
-            let result = fed.and_then(|()| log.close());
+            let result = feed(&receiver, &mut log, &mut frames).and_then(|()| log.close());
             // nobody listens any more if the run gave the stream up
             let _ = finished.send((frames, result));
         };
         let thread = std::thread::Builder::new().name("viewer".into()).spawn(work);
         thread.map_err(|e| ViewerError::Setup { cause: e.to_string() })?;
-        Ok(Self { target, remedy, hinges, closures, sender: Some(sender), done, sent: 0, lost: None })
+        let (batch, since) = (Vec::new(), Instant::now());
+        Ok(Self { target, remedy, hinges, closures, sender: Some(sender), batch, since, most, done, sent: 0, lost: None })
     }
 
     /// Path or address.
@@ -228,22 +245,31 @@ impl ViewerStream {
         &self.closures
     }
 
-    /// Hands over one output time.
+    /// Takes one output time.
     pub fn send(&mut self, snapshot: Snapshot) {
-        if self.push(Message::Frame(Box::new(snapshot))) {
-            self.sent += 1;
+        self.batch.push(Message::Frame(snapshot));
+        if self.batch.len() >= self.most || self.since.elapsed() >= HAND_OVER {
+            self.hand_over();
         }
     }
 
     /// Hands over a line.
     pub fn note(&mut self, time: f64, text: &str) {
-        self.push(Message::Note(time, text.to_owned()));
+        self.batch.push(Message::Note(time, text.to_owned()));
+        self.hand_over();
     }
 
-    fn push(&mut self, message: Message) -> bool {
-        let Some(sender) = &self.sender else { return false };
-        match sender.send_timeout(message, PATIENCE) {
-            Ok(()) => return true,
+    fn hand_over(&mut self) {
+        let batch = std::mem::take(&mut self.batch);
+        let Some(sender) = &self.sender else { return };
+        let frames = batch.iter().filter(|m| matches!(m, Message::Frame(_))).count() as u64;
+        let sent = sender.send_timeout(batch, PATIENCE);
+        self.since = Instant::now();
+        match sent {
+            Ok(()) => {
+                self.sent += frames;
+                return;
+            }
             Err(SendTimeoutError::Timeout(_)) => {
                 let cause = format!("it took no data for {} s", PATIENCE.as_secs());
                 self.lost = Some(self.lost_by(self.sent, cause));
@@ -257,7 +283,6 @@ impl ViewerStream {
             }
         }
         self.sender = None;
-        false
     }
 
     fn lost_by(&self, frames: u64, cause: String) -> ViewerError {
@@ -269,6 +294,7 @@ impl ViewerStream {
     /// # Errors
     /// If something did not.
     pub fn finish(mut self) -> Result<ViewerSummary, ViewerError> {
+        self.hand_over();
         self.sender = None;
         if let Some(lost) = self.lost.take() {
             return Err(lost);
@@ -280,6 +306,38 @@ impl ViewerStream {
                 Err(self.lost_by(self.sent, format!("it did not take the rest within {} s", CLOSING.as_secs())))
             }
             Err(RecvTimeoutError::Disconnected) => Err(self.lost_by(self.sent, "its thread ended".into())),
+        }
+    }
+}
+
+/// Logs messages until the sender is gone; output times are held back a little, so that they can be passed on together.
+fn feed(receiver: &Receiver<Vec<Message>>, log: &mut impl FrameLog, frames: &mut u64) -> Result<(), String> {
+    let mut held: Option<Instant> = None;
+    let patience = log.patience();
+    loop {
+        let batch = match held {
+            None => receiver.recv().map_err(|_| RecvTimeoutError::Disconnected),
+            Some(since) => receiver.recv_timeout(patience.saturating_sub(since.elapsed())),
+        };
+        match batch {
+            Ok(batch) => {
+                held.get_or_insert_with(Instant::now);
+                for message in batch {
+                    match message {
+                        Message::Frame(snapshot) => {
+                            log.frame(&snapshot)?;
+                            *frames += 1;
+                        }
+                        Message::Note(time, text) => log.note(time, &text)?,
+                    }
+                }
+            }
+            Err(RecvTimeoutError::Timeout) => {}
+            Err(RecvTimeoutError::Disconnected) => return Ok(()),
+        }
+        if held.is_some_and(|since| since.elapsed() >= patience) {
+            log.flush()?;
+            held = None;
         }
     }
 }

@@ -1,24 +1,23 @@
-//! The Rerun stream: what is logged where, and the layout in which a viewer opens it. The only file that knows the Rerun SDK.
+//! The Rerun stream: what is logged where, and the layout in which a viewer opens it. The only folder that knows the Rerun SDK.
 //!
 //! Mesh topology, boxes, names and units are logged once as static data; positions and colours follow at output times through partial
-//! updates, since static data would hide what is logged later under the same component. The SDK waits for ever if nobody takes its data, so
-//! every flush here has a time limit, and a stream that failed is not dropped but left to the end of the process.
+//! updates, since static data would hide what is logged later under the same component. Output times are gathered into columns, for at
+//! most as long as nobody notices. The SDK waits for ever if nobody takes its data, so every flush here has a time limit, and a stream that
+//! failed is not dropped but left to the end of the process.
+
+mod columns;
+mod layout;
 
 use super::picture::{BodyPicture, ClosurePicture, ClosureSnapshot, LoadSnapshot, Picture, Snapshot};
 use super::plan::OutputPlan;
 use super::scales::{ColourMap, Scales, line_colour};
 use super::viewer::{FrameLog, ViewerError, ViewerStream, ViewerTarget, free_port, probe, spawn};
 use crate::model::{State, System};
-use rerun::blueprint::components::{BackgroundKind, PanelState, PlayState, TextLogColumn};
-use rerun::blueprint::datatypes::{self, TextLogColumnKind};
-use rerun::blueprint::{
-    Blueprint, BlueprintPanel, ContainerLike, Grid, Horizontal, SelectionPanel, Spatial3DView, Tabs, TextDocumentView, TextLogView,
-    TimePanel, TimeSeriesView, Vertical,
-};
-use rerun::external::re_log_types::{BlueprintActivationCommand, EntityPath, EntityPathPart, LogMsg};
-use rerun::external::re_sdk_types::blueprint::archetypes::{Background, EyeControls3D, LineGrid3D, PlotLegend, TextLogColumns};
+use columns::Columns;
+use layout::send_blueprint;
+use rerun::external::re_log_types::{EntityPath, EntityPathPart};
 use rerun::sink::SinkFlushError;
-use rerun::{AsComponents, RecordingStream, RecordingStreamBuilder, RecordingStreamError, RecordingStreamResult};
+use rerun::{RecordingStream, RecordingStreamBuilder, RecordingStreamError, RecordingStreamResult};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -30,14 +29,15 @@ pub const TIMELINE: &str = "sim_time";
 const FLUSH: Duration = Duration::from_secs(20);
 /// How long a file may stand still while it is flushed (s).
 const STALLED: Duration = Duration::from_secs(3);
+/// How long output times are held back to be passed on together: one picture of a screen where somebody may be watching.
+const HELD_FOR_EYES: Duration = Duration::from_millis(16);
+const HELD_FOR_FILE: Duration = Duration::from_millis(250);
 /// Length of the longest arrow relative to the radius of the scene.
 const ARROW: f64 = 0.45;
 /// Colours of moments and forces in the 3D view, and of x, y, z, magnitude and limit in plots.
 const MOMENT: [u8; 3] = [255, 140, 0];
 const FORCE: [u8; 3] = [0, 200, 255];
 const SERIES: [[u8; 3]; 5] = [[230, 80, 60], [80, 190, 90], [80, 130, 240], [230, 230, 230], [255, 200, 0]];
-/// Background of the 3D view: dark and bright ends of the colour map stand out from it.
-const SKY: [u8; 3] = [170, 176, 184];
 /// Pa to MPa.
 const MEGA: f64 = 1e-6;
 
@@ -105,8 +105,9 @@ fn stream(
     recording.set_log_time_enabled(false);
     recording.set_log_tick_enabled(false);
     let picture = Picture::new(system, plan, start);
+    let bytes = picture.snapshot_bytes();
     let log = RerunLog::new(recording, picture, end).map_err(|e| ViewerError::Setup { cause: e.to_string() })?;
-    ViewerStream::start(log, target, remedy, plan.loaded_hinges(), plan.loaded_closures())
+    ViewerStream::start(log, target, remedy, plan.loaded_hinges(), plan.loaded_closures(), bytes)
 }
 
 /// What the end of a stream has to see to.
@@ -153,6 +154,7 @@ struct RerunLog {
     points: Vec<Vec<[f32; 3]>>,
     values: Vec<Vec<f32>>,
     scales: Scales,
+    columns: Columns,
     begun: bool,
 }
 
@@ -164,6 +166,7 @@ impl RerunLog {
             values: picture.bodies.iter().map(|b| vec![0.0; room(b)]).collect(),
             colours: ColourMap::default(),
             scales: Scales::new(&picture),
+            columns: Columns::default(),
             begun: false,
             recording,
             picture,
@@ -209,6 +212,7 @@ impl RerunLog {
             for (quantity, unit, limit) in [("moment", "N m", hinge.moment_limit), ("force", "N", hinge.force_limit)] {
                 rec.log_static(path(&["loads", &hinge.name, quantity]), &load_series(quantity, unit, limit))?;
             }
+            self.log_static_arrows("hinges", &hinge.name)?;
         }
         self.picture.closures.iter().try_for_each(|closure| self.log_static_closure(closure))
     }
@@ -226,10 +230,20 @@ impl RerunLog {
                 for (quantity, unit, limit) in [("moment", "N m", closure.moment_limit), ("force", "N", closure.force_limit)] {
                     rec.log_static(path(&["closures", name, quantity]), &load_series(quantity, unit, limit))?;
                 }
+                self.log_static_arrows("closures", name)?;
             }
         }
         let residual = rerun::SeriesLines::new().with_names([format!("residual ({})", closure.residual_unit)]);
         rec.log_static(path(&["closures", name, "residual"]), &residual)
+    }
+
+    /// Colours and radii of the arrows of a load.
+    fn log_static_arrows(&self, group: &str, name: &str) -> RecordingStreamResult<()> {
+        let radius = (0.012 * self.picture.radius) as f32;
+        [("moment", MOMENT), ("force", FORCE)].into_iter().try_for_each(|(quantity, colour)| {
+            let arrows = rerun::Arrows3D::update_fields().with_colors([colour]).with_radii([radius]);
+            self.recording.log_static(path(&["world", group, name, quantity]), &arrows)
+        })
     }
 
     fn log_frame(&mut self, snapshot: &Snapshot) -> RecordingStreamResult<()> {
@@ -252,79 +266,43 @@ impl RerunLog {
         if rescaled {
             self.log_legend()?;
         }
-        self.log_bodies(snapshot, &peaks)?;
-        for (hinge, load) in self.picture.hinges.iter().zip(&snapshot.loads) {
-            self.log_load(["hinges", "loads"], &hinge.name, [hinge.moment_limit, hinge.force_limit], load)?;
+        self.columns.begin(snapshot.time);
+        self.gather_bodies(snapshot, &peaks);
+        let Self { picture, columns, scales, .. } = self;
+        let drawing = Drawing { length: ARROW * picture.radius, scales };
+        for (hinge, load) in picture.hinges.iter().zip(&snapshot.loads) {
+            drawing.gather_load(columns, ["hinges", "loads"], &hinge.name, [hinge.moment_limit, hinge.force_limit], load);
         }
-        for (closure, at) in self.picture.closures.iter().zip(&snapshot.closures) {
-            self.log_closure(closure, at)?;
+        for (closure, at) in picture.closures.iter().zip(&snapshot.closures) {
+            drawing.gather_closure(columns, closure, at);
         }
         for (warning, text) in &snapshot.events {
             self.log_line(text, if *warning { rerun::TextLogLevel::WARN } else { rerun::TextLogLevel::INFO })?;
         }
         self.begun = true;
-        Ok(())
+        if self.columns.is_full() { self.columns.send(&self.recording) } else { Ok(()) }
     }
 
-    fn log_bodies(&self, snapshot: &Snapshot, peaks: &[f64]) -> RecordingStreamResult<()> {
-        let rec = &self.recording;
-        for (k, (body, (position, [w, x, y, z]))) in self.picture.bodies.iter().zip(&snapshot.poses).enumerate() {
-            let entity = body_path(&body.name);
+    fn gather_bodies(&mut self, snapshot: &Snapshot, peaks: &[f64]) {
+        let Self { picture, columns, colours, scales, .. } = self;
+        for (k, (body, (position, [w, x, y, z]))) in picture.bodies.iter().zip(&snapshot.poses).enumerate() {
             let turn = rerun::Quaternion::from_xyzw([*x, *y, *z, *w].map(|q| q as f32));
-            rec.log(entity.clone(), &rerun::Transform3D::from_translation_rotation(single(*position), turn))?;
+            columns.pose(|| body_path(&body.name), single(*position), turn);
             if let Some(surface) = &body.surface {
-                let mesh = rerun::Mesh3D::update_fields().with_vertex_positions(self.points[k].iter().copied());
-                let mesh = if surface.stress {
-                    let colour = |value: &f32| self.colours.colour(self.scales.stress.share(f64::from(*value)));
-                    mesh.with_vertex_colors(self.values[k].iter().map(colour))
-                } else {
-                    mesh
-                };
-                rec.log(below(&entity, "mesh"), &mesh)?;
+                // no values, no colours: a surface without stress has one colour
+                let values = if surface.stress { &self.values[k][..] } else { &[] };
+                let colour = |value: &f32| colours.colour(scales.stress.share(f64::from(*value)));
+                columns.surface(|| below(&body_path(&body.name), "mesh"), &self.points[k], values.iter().map(colour));
                 if surface.stress {
                     let values = std::iter::once(peaks[k]).chain(surface.stress_limit).map(|pascal| pascal * MEGA);
-                    rec.log(path(&["stress", &body.name]), &rerun::Scalars::new(values))?;
+                    columns.numbers(|| path(&["stress", &body.name]), values);
                 }
             }
             if !body.mode_names.is_empty() {
                 let eta = snapshot.modal_position.get(body.modes.clone()).unwrap_or_default();
-                rec.log(path(&["modes", &body.name]), &rerun::Scalars::new(eta.iter().copied()))?;
+                columns.numbers(|| path(&["modes", &body.name]), eta.iter().copied());
             }
         }
-        Ok(())
-    }
-
-    fn log_closure(&self, closure: &ClosurePicture, at: &ClosureSnapshot) -> RecordingStreamResult<()> {
-        let name = closure.name.as_str();
-        if let Some(load) = &at.joint {
-            self.log_load(["closures"; 2], name, [closure.moment_limit, closure.force_limit], load)?;
-        }
-        if let Some(force) = at.gear {
-            let values = [force, force.abs()].into_iter().chain(closure.gear_limit());
-            self.recording.log(path(&["closures", name, "coordinate_force"]), &rerun::Scalars::new(values))?;
-        }
-        self.recording.log(path(&["closures", name, "residual"]), &rerun::Scalars::single(at.residual))
-    }
-
-    /// Arrows under `world` in the first of `groups`, numbers in the second; `limits` are those of moment and force.
-    fn log_load(&self, groups: [&str; 2], name: &str, limits: [Option<f64>; 2], load: &LoadSnapshot) -> RecordingStreamResult<()> {
-        let length = ARROW * self.picture.radius;
-        let parts = [
-            ("moment", load.moment_world, 0, self.scales.moment, MOMENT, limits[0]),
-            ("force", load.force_world, 3, self.scales.force, FORCE, limits[1]),
-        ];
-        for (quantity, vector, row, scale, colour, limit) in parts {
-            let arrow = vector.map(|x| (length * scale.share(x)) as f32);
-            let arrows = rerun::Arrows3D::from_vectors([arrow])
-                .with_origins([single(load.point)])
-                .with_colors([colour])
-                .with_radii([(0.012 * self.picture.radius) as f32]);
-            self.recording.log(path(&["world", groups[0], name, quantity]), &arrows)?;
-            let components = load.load.fixed_rows::<3>(row);
-            let values = components.iter().copied().chain([components.norm()]).chain(limit);
-            self.recording.log(path(&[groups[1], name, quantity]), &rerun::Scalars::new(values))?;
-        }
-        Ok(())
     }
 
     /// The ranges in use, as a document that a view shows and as a log line.
@@ -338,6 +316,40 @@ impl RerunLog {
     }
 }
 
+/// How loads are drawn at one time.
+struct Drawing<'d> {
+    /// Of the longest arrow (m).
+    length: f64,
+    scales: &'d Scales,
+}
+
+impl Drawing<'_> {
+    fn gather_closure(&self, columns: &mut Columns, closure: &ClosurePicture, at: &ClosureSnapshot) {
+        let name = closure.name.as_str();
+        if let Some(load) = &at.joint {
+            self.gather_load(columns, ["closures"; 2], name, [closure.moment_limit, closure.force_limit], load);
+        }
+        if let Some(force) = at.gear {
+            let values = [force, force.abs()].into_iter().chain(closure.gear_limit());
+            columns.numbers(|| path(&["closures", name, "coordinate_force"]), values);
+        }
+        columns.numbers(|| path(&["closures", name, "residual"]), [at.residual]);
+    }
+
+    /// Arrows under `world` in the first of `groups`, numbers in the second; `limits` are those of moment and force.
+    fn gather_load(&self, columns: &mut Columns, groups: [&str; 2], name: &str, limits: [Option<f64>; 2], load: &LoadSnapshot) {
+        let parts =
+            [("moment", load.moment_world, 0, self.scales.moment, limits[0]), ("force", load.force_world, 3, self.scales.force, limits[1])];
+        for (quantity, vector, row, scale, limit) in parts {
+            let arrow = vector.map(|x| (self.length * scale.share(x)) as f32);
+            columns.arrow(|| path(&["world", groups[0], name, quantity]), single(load.point), arrow);
+            let components = load.load.fixed_rows::<3>(row);
+            let values = components.iter().copied().chain([components.norm()]).chain(limit);
+            columns.numbers(|| path(&[groups[1], name, quantity]), values);
+        }
+    }
+}
+
 impl FrameLog for RerunLog {
     fn frame(&mut self, snapshot: &Snapshot) -> Result<(), String> {
         self.log_frame(snapshot).map_err(|e| e.to_string())
@@ -348,7 +360,16 @@ impl FrameLog for RerunLog {
         self.log_line(text, rerun::TextLogLevel::ERROR).map_err(|e| e.to_string())
     }
 
-    fn close(self) -> Result<(), String> {
+    fn patience(&self) -> Duration {
+        if matches!(self.end, End::File(_)) { HELD_FOR_FILE } else { HELD_FOR_EYES }
+    }
+
+    fn flush(&mut self) -> Result<(), String> {
+        self.columns.send(&self.recording).map_err(|e| e.to_string())
+    }
+
+    fn close(mut self) -> Result<(), String> {
+        self.flush()?;
         let Self { recording, end, .. } = self;
         let flushed = match &end {
             End::File(file) => flush_to_disk(&recording, file),
@@ -397,110 +418,4 @@ fn ends_in_footer(file: &Path) -> bool {
         f.read_to_end(&mut tail)
     });
     read.is_ok() && tail.windows(4).any(|word| word == b"FOOT")
-}
-
-/// Most hinges and closures whose plots are all open at once; with more, each has a tab.
-const OPEN_PLOTS: usize = 3;
-
-/// A hinge or closure with plots of its load.
-struct Plotted<'p> {
-    group: &'static str,
-    name: &'p str,
-    side: &'p str,
-    /// Entity, words and unit of each plot.
-    quantities: Vec<(&'static str, &'static str, &'static str)>,
-}
-
-/// What has plots, two each and in this order; gears, which have one, come last.
-fn plotted<'p>(picture: &'p Picture) -> Vec<Plotted<'p>> {
-    let spatial = || vec![("moment", "moment", "N m"), ("force", "force", "N")];
-    let hinges = picture.hinges.iter().filter(|h| h.carries);
-    let hinges = hinges.map(|h| Plotted { group: "loads", name: &h.name, side: &h.side, quantities: spatial() });
-    let of_closure = |c: &'p ClosurePicture, quantities| Plotted { group: "closures", name: &c.name, side: &c.side, quantities };
-    let joints = picture.closures.iter().filter(|c| c.gear_unit.is_none()).map(|c| of_closure(c, spatial()));
-    let gears = picture.closures.iter().filter_map(|c| {
-        let unit = c.gear_unit?;
-        let words = if unit == "N" { "force" } else { "moment" };
-        Some(of_closure(c, vec![("coordinate_force", words, unit)]))
-    });
-    hinges.chain(joints).chain(gears).collect()
-}
-
-/// Properties of views by entity in the blueprint's store: the blueprint builder has none for these kinds of view.
-type Properties = Vec<(EntityPath, Box<dyn AsComponents>)>;
-
-/// The layout: the whole system on the left above legend and events, plots of every load, stress and mode on the right.
-fn layout(picture: &Picture, properties: &mut Properties) -> Blueprint {
-    let mut set = |view: &ContainerLike, name: &str, property: Box<dyn AsComponents>| {
-        if let ContainerLike::View(view) = view {
-            properties.push((below(&view.blueprint_path(), name), property));
-        }
-    };
-    let space: ContainerLike = Spatial3DView::new(picture.scene.as_str()).with_origin("/world").into();
-    let eye =
-        EyeControls3D::new().with_position(single(picture.eye)).with_look_target(single(picture.center)).with_eye_up([0.0_f32, 0.0, 1.0]);
-    set(&space, "EyeControls3D", Box::new(eye));
-    set(&space, "LineGrid3D", Box::new(LineGrid3D::new().with_visible(false)));
-    set(&space, "Background", Box::new(Background::new(BackgroundKind::SolidColor).with_color(SKY)));
-    let events: ContainerLike = TextLogView::new("events").with_origin("/events").into();
-    let columns = [(TextLogColumnKind::LogLevel, true), (TextLogColumnKind::Body, true)];
-    let columns = columns.map(|(kind, visible)| TextLogColumn(datatypes::TextLogColumn { kind, visible: visible.into() }));
-    set(&events, "TextLogColumns", Box::new(TextLogColumns::new().with_text_log_columns(columns)));
-    let legend: ContainerLike = TextDocumentView::new("legend").with_origin("/legend").into();
-
-    let mut plot = |name: String, origin: EntityPath, named: bool| -> ContainerLike {
-        let view: ContainerLike = TimeSeriesView::new(name).with_origin(origin).into();
-        // the legend of a small plot hides it; names show under the pointer, colours are in the legend
-        set(&view, "PlotLegend", Box::new(PlotLegend::new().with_visible(named)));
-        view
-    };
-    let mut loads = Vec::new();
-    for Plotted { group, name, side, quantities } in plotted(picture) {
-        let of = |(quantity, words, unit): &(&str, &str, &str)| {
-            plot(format!("{name}: {words} {side}, {unit}"), path(&[group, name, quantity]), false)
-        };
-        loads.push((name, quantities.iter().map(of).collect::<Vec<_>>()));
-    }
-    let count = loads.len();
-    let loads: Option<ContainerLike> = match count {
-        0 => None,
-        1..=OPEN_PLOTS => Some(Grid::new(loads.into_iter().flat_map(|(_, plots)| plots)).with_grid_columns(2).into()),
-        _ => Some(Tabs::new(loads.into_iter().map(|(name, plots)| Vertical::new(plots).with_name(name).into())).into()),
-    };
-    let stressed = picture.bodies.iter().any(|b| b.surface.as_ref().is_some_and(|s| s.stress));
-    let stress = stressed.then(|| plot("von Mises peak, MPa".into(), path(&["stress"]), true));
-    let modes = picture.bodies.iter().filter(|b| !b.mode_names.is_empty());
-    let modes: Vec<_> = modes.map(|b| plot(format!("{}: modal coordinates", b.name), path(&["modes", &b.name]), false)).collect();
-    let modes = (!modes.is_empty()).then(|| Tabs::new(modes).into());
-    let lower: Vec<ContainerLike> = stress.into_iter().chain(modes).collect();
-    let lower = (!lower.is_empty()).then(|| Horizontal::new(lower).into());
-    let shares: Vec<f32> = loads.iter().map(|_| count.min(OPEN_PLOTS) as f32).chain(lower.iter().map(|_| 1.0)).collect();
-    let right: Vec<ContainerLike> = loads.into_iter().chain(lower).collect();
-    let left = Vertical::new([space, Horizontal::new([legend, events]).into()]).with_row_shares(vec![2.6, 1.0]);
-    let columns: Vec<ContainerLike> =
-        if right.is_empty() { vec![left.into()] } else { vec![left.into(), Vertical::new(right).with_row_shares(shares).into()] };
-    let time = TimePanel::new().with_timeline(TIMELINE).with_state(PanelState::Collapsed).with_play_state(PlayState::Following);
-    Blueprint::new(Horizontal::new(columns))
-        .with_time_panel(time)
-        .with_blueprint_panel(BlueprintPanel::from_state(PanelState::Hidden))
-        .with_selection_panel(SelectionPanel::from_state(PanelState::Hidden))
-        .with_auto_views(false)
-        .with_auto_layout(false)
-}
-
-/// Sends the layout with the properties of its views, which are plain data in the blueprint's store.
-fn send_blueprint(recording: &RecordingStream, picture: &Picture) -> RecordingStreamResult<()> {
-    let mut properties = Properties::new();
-    let blueprint = layout(picture, &mut properties);
-    let (scratch, store) = RecordingStreamBuilder::new(APPLICATION).memory()?;
-    blueprint.send(&scratch, Default::default())?;
-    let wanted = |m: &LogMsg| m.store_id().kind() == rerun::StoreKind::Blueprint && !matches!(m, LogMsg::BlueprintActivationCommand(_));
-    let mut messages: Vec<LogMsg> = store.take().into_iter().filter(wanted).collect();
-    let Some(id) = messages.first().map(|m| m.store_id().clone()) else { return Ok(()) };
-    let (extra, store) = RecordingStreamBuilder::from_store_id(&id).memory()?;
-    extra.set_time_sequence("blueprint", 0);
-    properties.iter().try_for_each(|(entity, property)| extra.log(entity.clone(), property.as_ref()))?;
-    messages.extend(store.take().into_iter().filter(|m| matches!(m, LogMsg::ArrowMsg(..))));
-    recording.send_blueprint(messages, BlueprintActivationCommand { blueprint_id: id, make_active: true, make_default: true });
-    Ok(())
 }
