@@ -11,6 +11,8 @@ step cargo fmt --check
 step cargo clippy --release --locked --all-targets -- -D warnings
 RUSTDOCFLAGS="-D warnings" step cargo doc --release --locked --no-deps --lib --quiet
 step cargo test --release --locked
+# instructions of the hot paths against the stored ones
+step .venv/bin/python scripts/count_instructions.py
 # the core alone, without modal files and viewer
 step cargo check --release --locked --no-default-features --lib --bins
 step .venv/bin/python -m pytest -q tests/python
