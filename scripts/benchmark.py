@@ -118,8 +118,9 @@ def flexible_part(options, folder, results):
     if exudyn and not comparison.agrees:
         engines.say("exudyn computes something else and is not shown")
     results["flexible"] = [{"program": r.engine, "setting": r.words, "cpu_s_per_s": r.cpu,
-                            **{q: r.error(comparison.reference, q) for q in flexible.QUANTITIES}} for r in comparison.runs]
-    table = flexible.table(comparison)
+                            **{q: r.error(comparison.reference, q) for q in flexible.QUANTITIES},
+                            "all_forces": r.largest_error(comparison.reference)} for r in comparison.runs]
+    table = flexible.table(comparison) + "\n\n" + flexible.cheapest(comparison)
     print(table, end="\n\n")
     return {"flexible": table}
 

@@ -3,6 +3,7 @@
 //!
 //! Solvers: `rk4`, `rk44`: rk4 in steps of h; `implicit`: rosenbrock_w in steps of h; `rosenbrock_w`, `dormand_prince`: the method with
 //! error control at the relative tolerance h, absolute tolerance a thousandth of it; `auto`: as scenes choose it for 60 outputs per second.
+//! A request that ends in `history` is answered with the forces at all hinges at those outputs as well.
 
 use crate::panels::Panel;
 use cpu_time::ThreadTime;
@@ -13,7 +14,7 @@ use pliant::dynamics::{Workspace, forward_dynamics};
 use pliant::integrate::choice::choose;
 use pliant::integrate::simulate::Method;
 use pliant::integrate::step_control::Tolerance;
-use pliant::integrate::{Outcome, Settings, simulate};
+use pliant::integrate::{Flow, Observer, Outcome, Sample, Settings, simulate};
 use pliant::model::build::{BodyDefinition, BodyDefinitionKind, Definition, HingeDefinition, LoadDefinition, PointDefinition, WORLD};
 use pliant::model::load::LoadAxes;
 use pliant::model::{InertiaOrder, System, TimeFunction};
@@ -74,6 +75,17 @@ fn hub_and_panels(panel: &Panel, count: usize) -> Definition {
     definition
 }
 
+/// Force of every panel on what carries it, panel after panel (N), at every output time.
+struct Forces(Vec<Vec<f64>>);
+
+impl Observer for Forces {
+    fn observe(&mut self, sample: &Sample<'_>) -> Flow {
+        let force = |&k: &usize| hinge_load_on_parent(sample.workspace, k).fixed_rows::<3>(3).iter().copied().collect::<Vec<_>>();
+        self.0.push(sample.system.definition_order[1..].iter().flat_map(force).collect());
+        Flow::Continue
+    }
+}
+
 fn method(solver: &str, system: &System, h: f64) -> Option<Method> {
     let tolerance = Tolerance { relative: h, absolute: 1e-3 * h };
     let largest_step = f64::INFINITY;
@@ -88,16 +100,19 @@ fn method(solver: &str, system: &System, h: f64) -> Option<Method> {
 }
 
 fn answer(folder: &Path, request: &str) -> Result<serde_json::Value, Box<dyn Error>> {
-    let [count, modes, solver, h, duration] = request.split_whitespace().collect::<Vec<_>>()[..] else {
-        return Err(format!("request \"{request}\" is not <panels> <modes> <solver> <h> <T>").into());
+    let words: Vec<_> = request.split_whitespace().collect();
+    let ([count, modes, solver, h, duration] | [count, modes, solver, h, duration, "history"]) = words[..] else {
+        return Err(format!("request \"{request}\" is not <panels> <modes> <solver> <h> <T>, with \"history\" or without").into());
     };
     let (count, modes, h, duration): (usize, usize, f64, f64) = (count.parse()?, modes.parse()?, h.parse()?, duration.parse()?);
     let panel = Panel::of(folder, modes)?;
     let (system, state) = hub_and_panels(&panel, count).build()?;
     let method = method(solver, &system, h).ok_or_else(|| format!("no solver \"{solver}\""))?;
     let settings = Settings { duration, method, rate_hz: RATE };
+    let mut forces = Forces(Vec::new());
+    let mut observers: Vec<&mut dyn Observer> = if words.len() > 5 { vec![&mut forces] } else { vec![] };
     let start = ThreadTime::now();
-    let summary = simulate(&system, &state, &settings, &mut []);
+    let summary = simulate(&system, &state, &settings, &mut observers);
     let cpu = start.elapsed().as_secs_f64();
     if let Outcome::Failed(failure) = &summary.outcome {
         return Err(failure.to_string().into());
@@ -120,7 +135,7 @@ fn answer(folder: &Path, request: &str) -> Result<serde_json::Value, Box<dyn Err
     };
     let rotation = system.definition_order[1..].iter().map(|&k| turned(k)).fold(0.0, f64::max);
     Ok(json!({
-        "rotation": rotation,
+        "rotation": rotation, "forces": forces.0,
         "m": count, "n": modes, "solver": solver, "method": method.name(), "h": h, "T": duration, "cpu": cpu, "newton": null,
         "steps": summary.steps, "rejected": summary.rejected, "evaluations": summary.evaluations,
         "tip": tip.as_slice(),
