@@ -7,11 +7,19 @@ one thread. A peer that does not install, compile or agree is left out, with the
 """
 import argparse
 import json
+import os
+import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
-import matplotlib
+ROOT = Path(__file__).resolve().parents[1]
+if Path(sys.prefix).resolve() != (ROOT / ".venv").resolve():
+    subprocess.run([ROOT / "scripts" / "setup.sh"], check=True)
+    python = str(ROOT / ".venv" / "bin" / "python")
+    os.execv(python, [python, *sys.argv])
+
+import matplotlib  # noqa: E402
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
@@ -19,13 +27,12 @@ import matplotlib.pyplot as plt  # noqa: E402
 from peers import engines, flexible, panel, rigid  # noqa: E402
 from readme_tables import put_tables  # noqa: E402
 
-ROOT = Path(__file__).resolve().parents[1]
 RIGID_PEERS = ("pinocchio", "mujoco", "drake")
 EPILOG = """\
---kernel adds a program of your own to the rigid part and to both figures: it reads requests "chain 64 fd 0.05" (system, links, fd or fdf,
+--kernel adds a program of your own to the rigid part: it reads requests "chain 64 fd 0.05" (system, links, fd or fdf,
 seconds) and answers "<least ns per call> <median ns> <sum of absolute hinge accelerations>", or "skip". It is printed, never written to README.md.
 
-Takes about ten minutes, the first time five more and 4 GB of memory for compiling. Needs what scripts/setup.sh installs, and g++.
+Takes about three minutes, the first time some more and 4 GB of memory for compiling. Needs what scripts/setup.sh needs, and g++.
 """
 
 

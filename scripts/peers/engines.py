@@ -45,7 +45,8 @@ def install(peer):
         done = subprocess.run([python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "-c", REQUIREMENTS, *wanted],
                               capture_output=True, text=True)
         if done.returncode:
-            raise Unavailable(f"does not install: {done.stderr.strip().splitlines()[-1] if done.stderr.strip() else 'pip failed'}")
+            reasons = [line for line in done.stderr.splitlines() if line.startswith("ERROR")]
+            raise Unavailable(f"does not install: {reasons[0] if reasons else 'pip failed'}")
         mark.write_text(" ".join(wanted))
     return python
 
