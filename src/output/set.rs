@@ -190,6 +190,9 @@ impl Observer for OutputSet<'_> {
         if let Some(gauge) = &mut self.truncation {
             gauge.follow(step);
         }
+        if let Some(viewer) = &mut self.viewer {
+            viewer.pass_on();
+        }
         self.spent += started.elapsed();
         Flow::Continue
     }

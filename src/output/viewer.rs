@@ -248,7 +248,16 @@ impl ViewerStream {
     /// Takes one output time.
     pub fn send(&mut self, snapshot: Snapshot) {
         self.batch.push(Message::Frame(snapshot));
-        if self.batch.len() >= self.most || self.since.elapsed() >= HAND_OVER {
+        if self.batch.len() >= self.most {
+            self.hand_over();
+        } else {
+            self.pass_on();
+        }
+    }
+
+    /// Hands over what has waited long enough: to be called often, or the last output times wait for the next one.
+    pub fn pass_on(&mut self) {
+        if !self.batch.is_empty() && self.since.elapsed() >= HAND_OVER {
             self.hand_over();
         }
     }
@@ -426,4 +435,73 @@ fn find_viewer(given: Option<&Path>) -> Result<PathBuf, ViewerError> {
     let folders = std::env::split_paths(&path).chain([PathBuf::from(".venv/bin")]);
     let found = folders.map(|folder| folder.join(&name)).find(|file| file.is_file());
     found.ok_or_else(|| ViewerError::NoExecutable { tried: format!("`{name}` is neither on PATH nor in .venv/bin") })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::{Arc, Mutex};
+
+    /// Keeps times of frames, and of the frames that were passed on; takes its time.
+    #[derive(Clone, Default)]
+    struct Kept {
+        held: Arc<Mutex<Vec<f64>>>,
+        passed: Arc<Mutex<Vec<f64>>>,
+    }
+
+    impl FrameLog for Kept {
+        fn frame(&mut self, snapshot: &Snapshot) -> Result<(), String> {
+            std::thread::sleep(Duration::from_millis(1));
+            self.held.lock().map_err(|e| e.to_string())?.push(snapshot.time);
+            Ok(())
+        }
+
+        fn note(&mut self, _time: f64, _text: &str) -> Result<(), String> {
+            Ok(())
+        }
+
+        fn patience(&self) -> Duration {
+            Duration::from_millis(5)
+        }
+
+        fn flush(&mut self) -> Result<(), String> {
+            let mut held = self.held.lock().map_err(|e| e.to_string())?;
+            self.passed.lock().map_err(|e| e.to_string())?.append(&mut held);
+            Ok(())
+        }
+
+        fn close(mut self) -> Result<(), String> {
+            self.flush()
+        }
+    }
+
+    fn at(time: f64) -> Snapshot {
+        Snapshot { time, ..Snapshot::default() }
+    }
+
+    #[test]
+    fn a_slow_viewer_gets_everything_in_order_through_the_smallest_room() -> Result<(), Box<dyn std::error::Error>> {
+        let log = Kept::default();
+        let mut stream = ViewerStream::start(log.clone(), "test".into(), "none", vec![], vec![], usize::MAX / BATCHES)?;
+        let times: Vec<f64> = (0..100).map(f64::from).collect();
+        times.iter().for_each(|&time| stream.send(at(time)));
+        assert_eq!(stream.finish()?, ViewerSummary { frames: 100 });
+        assert_eq!(*log.passed.lock().map_err(|e| e.to_string())?, times);
+        Ok(())
+    }
+
+    #[test]
+    fn what_is_held_back_is_passed_on_while_the_run_goes_on() -> Result<(), Box<dyn std::error::Error>> {
+        let log = Kept::default();
+        let mut stream = ViewerStream::start(log.clone(), "test".into(), "none", vec![], vec![], 1)?;
+        std::thread::sleep(2 * HAND_OVER);
+        stream.send(at(0.5));
+        let begin = Instant::now();
+        while log.passed.lock().map_err(|e| e.to_string())?.is_empty() {
+            assert!(begin.elapsed() < PATIENCE, "nothing was passed on");
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        assert_eq!(stream.finish()?, ViewerSummary { frames: 1 });
+        Ok(())
+    }
 }
