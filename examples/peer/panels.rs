@@ -2,7 +2,7 @@
 
 use crate::protocol::Case;
 use nalgebra::Vector3;
-use pliant::dynamics::{Workspace, forward_dynamics};
+use pliant::dynamics::{Workspace, accelerations};
 use pliant::io::ModalFile;
 use pliant::model::build::{BodyDefinition, BodyDefinitionKind, Definition, FlexibleDefinition, Frame, HingeDefinition, WORLD};
 use pliant::model::flexible_body::ModalIntegrals;
@@ -140,7 +140,7 @@ impl Case for Chain {
         if let Some(rate) = state.velocity.last_mut() {
             *rate = self.last + 1e-12 * f64::from(call);
         }
-        forward_dynamics(system, state, workspace)?;
+        accelerations(system, state, workspace)?;
         self.shown = order.unwrap_or_default();
         Ok(true)
     }

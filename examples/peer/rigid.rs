@@ -8,7 +8,7 @@ use crate::links::Model;
 use crate::protocol::Case;
 use nalgebra::Vector6;
 use pliant::dynamics::hinge_load::hinge_loads;
-use pliant::dynamics::{Workspace, dense, forward_dynamics};
+use pliant::dynamics::{Workspace, accelerations, dense};
 use pliant::model::{State, System};
 use std::error::Error;
 
@@ -16,7 +16,9 @@ use std::error::Error;
 pub struct Rigid {
     system: System,
     state: State,
-    workspace: Workspace,
+    /// For `fd`, without room for loads, and for `fdf`; made when first asked for.
+    workspaces: [Option<Workspace>; 2],
+    asked: usize,
     loads: Vec<Vector6<f64>>,
     /// Rate of the last hinge.
     last: f64,
@@ -29,29 +31,34 @@ impl Rigid {
     /// If there is none.
     pub fn build(name: &str, n: usize) -> Result<Option<Self>, Box<dyn Error>> {
         let (system, state) = Model::of(name, n)?.definition().build()?;
-        let (workspace, loads) = (Workspace::new(&system), vec![Vector6::zeros(); system.bodies.len()]);
+        let loads = vec![Vector6::zeros(); system.bodies.len()];
         let last = state.velocity.last().copied().ok_or("a model without hinges")?;
-        Ok(Some(Self { system, state, workspace, loads, last }))
+        Ok(Some(Self { system, state, workspaces: [None, None], asked: 0, loads, last }))
     }
 
     fn accelerations(&self) -> impl Iterator<Item = f64> {
         let revolute = |k: &&usize| self.system.bodies[**k].velocity_range().len() == 1;
         let order = self.system.definition_order.iter().filter(revolute);
-        order.map(|&k| self.workspace.acceleration.hinge[self.system.bodies[k].velocity])
+        let found = self.workspaces[self.asked].as_ref().map_or(&[][..], |w| &w.acceleration.hinge);
+        order.filter_map(|&k| found.get(self.system.bodies[k].velocity).copied())
     }
 }
 
 impl Case for Rigid {
     fn call(&mut self, op: &str, call: u32) -> Result<bool, Box<dyn Error>> {
-        if op != "fd" && op != "fdf" {
-            return Ok(false);
-        }
+        self.asked = match op {
+            "fd" => 0,
+            "fdf" => 1,
+            _ => return Ok(false),
+        };
         if let Some(rate) = self.state.velocity.last_mut() {
             *rate = self.last + 1e-12 * f64::from(call);
         }
-        forward_dynamics(&self.system, &self.state, &mut self.workspace)?;
+        let room = if op == "fdf" { Workspace::new } else { Workspace::without_loads };
+        let workspace = self.workspaces[self.asked].get_or_insert_with(|| room(&self.system));
+        accelerations(&self.system, &self.state, workspace)?;
         if op == "fdf" {
-            hinge_loads(&self.system, &self.workspace, &mut self.loads);
+            hinge_loads(&self.system, workspace, &mut self.loads);
             std::hint::black_box(&self.loads);
         }
         Ok(true)

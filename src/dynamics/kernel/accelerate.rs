@@ -1,7 +1,7 @@
 //! Third pass: accelerations and hinge loads, from the base to the tips. Source: Paper Eq. 13 and 18, in inertial axes.
 
-use super::layout::Passage;
-use super::{Branch, NONE, Outboard, TreeKernel, arm, parent_motion};
+use super::layout::{Passage, Shape};
+use super::{Branch, Motion, NONE, Outboard, TreeKernel, arm, attitude, parent_motion};
 use crate::dynamics::sweep::force_inward::world_acceleration;
 use crate::model::{State, System};
 use crate::spatial::lanes::Lanes;
@@ -26,8 +26,8 @@ pub fn accelerate<L: Lanes>(s: L, tree: &mut TreeKernel, system: &System, state:
                 None => at_world,
             };
         }
+        let shape = &layout.shapes[link.shape as usize];
         if link.passage != Passage::General {
-            let shape = &layout.shapes[link.shape as usize];
             let (turn, omega) = parent_motion(s, link, layout, motion, flexible);
             let m = &motion[k];
             let axis = s.load([m[6], m[7], m[8], m[9]]);
@@ -35,7 +35,7 @@ pub fn accelerate<L: Lanes>(s: L, tree: &mut TreeKernel, system: &System, state:
             // alpha+ = phi* alpha of the parent
             linear = s.sub(linear, s.cross(at.l, angular));
             if let Some(out) = outboard.get_mut(k) {
-                write_load(s, out, angular, linear);
+                write_load(s, out, &motion[k], shape, angular, linear);
             }
             (angular, linear) = (s.add(angular, at.angular), s.add(linear, at.linear));
             if link.passage != Passage::Fixed {
@@ -54,7 +54,7 @@ pub fn accelerate<L: Lanes>(s: L, tree: &mut TreeKernel, system: &System, state:
             let own = &general[link.general as usize];
             linear = s.sub(linear, s.cross(s.of_three(own.l.into()), angular));
             if let Some(out) = outboard.get_mut(k) {
-                write_load(s, out, angular, linear);
+                write_load(s, out, &motion[k], shape, angular, linear);
             }
             let rates = system.bodies[k].velocity_range();
             let outer = spatial(&Vector3::from(s.three(angular)), &Vector3::from(s.three(linear)));
@@ -73,9 +73,9 @@ pub fn accelerate<L: Lanes>(s: L, tree: &mut TreeKernel, system: &System, state:
     }
 }
 
-/// `P+ alpha+ + z+`.
+/// `P+ alpha+ + z+`, turned into O axes.
 #[inline(always)]
-fn write_load<L: Lanes>(s: L, out: &mut Outboard, angular: L::V, linear: L::V) {
+fn write_load<L: Lanes>(s: L, out: &mut Outboard, motion: &Motion, shape: &Shape, angular: L::V, linear: L::V) {
     let rotational = [column(s, out, 0), column(s, out, 3), column(s, out, 6)];
     let coupling = [column(s, out, 9), column(s, out, 12), column(s, out, 15)];
     let translational = [column(s, out, 18), column(s, out, 21), column(s, out, 24)];
@@ -83,8 +83,21 @@ fn write_load<L: Lanes>(s: L, out: &mut Outboard, angular: L::V, linear: L::V) {
     let moving = [s.all_x(linear), s.all_y(linear), s.all_z(linear)];
     let moment = s.add(s.combine_add(rotational, angular, column(s, out, 27)), s.combine_lanes(coupling, moving));
     let force = s.add(s.combine_lanes(translational, moving), s.add(column(s, out, 30), s.sums(turned)));
+    let axes = attitude(s, motion);
+    let (mut moment, mut force) = (in_axes(s, axes, moment), in_axes(s, axes, force));
+    if shape.is_turned {
+        let t = &shape.turn_columns;
+        let turn = [s.load(t[0]), s.load(t[1]), s.load(t[2])];
+        (moment, force) = (s.combine(turn, moment), s.combine(turn, force));
+    }
     let (moment, force) = (s.three(moment), s.three(force));
     *out.first_chunk_mut().unwrap_or(&mut [0.0; 6]) = [moment[0], moment[1], moment[2], force[0], force[1], force[2]];
+}
+
+/// Inertial axes to those of columns `axes`.
+#[inline(always)]
+fn in_axes<L: Lanes>(s: L, axes: [L::V; 3], f: L::V) -> L::V {
+    s.sums([s.mul(axes[0], f), s.mul(axes[1], f), s.mul(axes[2], f)])
 }
 
 #[inline(always)]

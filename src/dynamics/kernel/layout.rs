@@ -23,6 +23,9 @@ pub struct Shape {
     pub inertia: [f64; 9],
     /// Link axes to O axes.
     pub turn: Matrix3<f64>,
+    /// Its columns, and whether it is more than the identity.
+    pub turn_columns: [[f64; 4]; 3],
+    pub is_turned: bool,
     /// Turn (rad) and travel (m) along the third axis per unit of the coordinate of a hinge of one rate.
     pub turn_rate: f64,
     pub travel_rate: f64,
@@ -270,6 +273,8 @@ impl Shape {
             mass: if body.flexible().is_some() { 0.0 } else { body.mass() },
             inertia: column((rotational + rotational.transpose()) * 0.5),
             turn,
+            turn_columns: std::array::from_fn(|j| [turn[(0, j)], turn[(1, j)], turn[(2, j)], 0.0]),
+            is_turned: turn != Matrix3::identity(),
             turn_rate: single.map_or(0.0, |s| s.1),
             travel_rate: single.map_or(0.0, |s| s.2),
         }

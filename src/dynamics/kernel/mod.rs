@@ -38,7 +38,7 @@ use flexible::FlexibleLink;
 use hinge::GeneralHinge;
 use layout::{Layout, Link, NONE, Passage, Shape};
 use modal_shape::ModalShape;
-use nalgebra::{Matrix3, Vector3, Vector6};
+use nalgebra::{Vector3, Vector6};
 
 /// Attitude (three columns: link axes to inertial axes) and angular velocity (inertial axes) of one body.
 pub(super) type Motion = [f64; 12];
@@ -49,7 +49,7 @@ pub(super) type Gain = [f64; 8];
 /// Numbers of an [`Outboard`]; the last three fill up.
 const RECORD: usize = 36;
 
-/// `P+` (rotational, coupling, translational: nine numbers each, by columns) and `z+` at O in inertial axes; then the load in the first six.
+/// `P+` (rotational, coupling, translational: nine numbers each, by columns) and `z+` at O in inertial axes; then the load in O axes in the first six.
 pub(super) type Outboard = [f64; RECORD];
 
 /// Quantities of a body that some child does not follow directly.
@@ -139,9 +139,7 @@ impl TreeKernel {
     /// number if loads were not asked for.
     #[must_use]
     pub fn hinge_load(&self, k: usize) -> Vector6<f64> {
-        let Some(load) = self.outboard.get(k) else { return Vector6::repeat(f64::NAN) };
-        let turn = self.hinge_axes(k).transpose();
-        spatial(&(turn * Vector3::new(load[0], load[1], load[2])), &(turn * Vector3::new(load[3], load[4], load[5])))
+        self.outboard.get(k).map_or_else(|| Vector6::repeat(f64::NAN), |load| Vector6::from_column_slice(&load[..6]))
     }
 
     /// Power (W) of motors, dampers, prescribed motions and external loads at the last evaluation, at `state`.
@@ -175,11 +173,6 @@ impl TreeKernel {
     #[must_use]
     pub fn inertia_trace(&self, k: usize) -> Option<f64> {
         self.flexible.get(self.layout.links[k].flexible as usize)?.inertia_trace()
-    }
-
-    /// O axes of body `k` to inertial axes.
-    fn hinge_axes(&self, k: usize) -> Matrix3<f64> {
-        Matrix3::from_column_slice(&self.motion[k][..9]) * self.layout.shapes[self.layout.links[k].shape as usize].turn.transpose()
     }
 }
 
