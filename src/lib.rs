@@ -16,6 +16,7 @@
 //! - [`scene`]: scene files to systems and settings;
 //! - [`output`]: observers that keep peaks and limits, write results and stream to the viewer (feature `rerun`);
 //! - [`study`]: error against run time over settings of one scene;
+//! - `campaign`: one scene for many values of its keys, and the envelope of its loads (feature `hdf5`);
 //! - [`cli`]: the program.
 //!
 //! # One evaluation
@@ -52,6 +53,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+#[cfg(feature = "hdf5")]
+pub mod campaign;
 pub mod cli;
 pub mod dynamics;
 pub mod integrate;

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Layers in order; a file may use its own and those before it.
-const LAYERS: [&str; 9] = ["spatial", "model", "dynamics", "integrate", "io", "scene", "output", "study", "cli"];
+const LAYERS: [&str; 10] = ["spatial", "model", "dynamics", "integrate", "io", "scene", "output", "study", "campaign", "cli"];
 
 /// Foreign crates that only some places may use.
 const CONFINED: [(&str, &[&str]); 9] = [

@@ -22,6 +22,10 @@ pub enum Command {
     Eval(EvalArguments),
     /// Run a scene over integrators, tolerances or steps, mode counts, inertia orders: error of every load against run time
     Study(StudyArguments),
+    /// Run a scene for many values of its keys, on all cores: envelope of every load with concurrent components, case and time
+    Sweep(SweepArguments),
+    /// Put the shards of a campaign together into one results file
+    Merge(MergeArguments),
     /// Check scenes and modal files; a modal file gets its health report, one row per rule
     Check(CheckArguments),
     /// Show the modes of a modal file: frequencies, effective masses, participation, interfaces, rules
@@ -204,6 +208,71 @@ pub struct EvalArguments {
     /// Print one JSON object instead of tables; every number reads back to the same f64
     #[arg(long)]
     pub json: bool,
+}
+
+/// Arguments of `pliant sweep`.
+#[derive(Debug, Args)]
+#[command(help_expected = true)]
+#[command(after_help = "A sweep that was ended goes on where it was: give the same command again.")]
+pub struct SweepArguments {
+    /// The scene (.toml)
+    #[arg(value_name = "SCENE")]
+    pub scene: PathBuf,
+    /// What varies: distributions and grids (.toml), or a table whose heading names keys of the scene, one case per row (.csv)
+    #[arg(value_name = "PLAN")]
+    pub plan: PathBuf,
+    /// Results file to write (HDF5)
+    #[arg(long, value_name = "FILE.h5", required_unless_present = "show_case")]
+    pub out: Option<PathBuf>,
+    /// Run share I of N only, into FILE.I-of-N.state.jsonl beside FILE.h5; put shares together by pliant merge
+    #[arg(long, value_name = "I/N", value_parser = shard)]
+    pub shard: Option<(usize, usize)>,
+    /// Cases at a time [default: one per core]
+    #[arg(long, value_name = "N")]
+    pub threads: Option<usize>,
+    /// Keep finished cases in this file (JSON lines), and take from it what is there [default: FILE.state.jsonl beside FILE.h5,
+    /// deleted when FILE.h5 is written]
+    #[arg(long, value_name = "FILE")]
+    pub state: Option<PathBuf>,
+    /// Write the envelope to this table
+    #[arg(long, value_name = "FILE")]
+    pub csv: Option<PathBuf>,
+    /// Simulated time (s) instead of the scene's
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    pub duration: Option<f64>,
+    /// Print the scene of case N, for pliant run, and run nothing
+    #[arg(long, value_name = "N")]
+    pub show_case: Option<usize>,
+    /// Changes to the scene
+    #[command(flatten)]
+    pub overrides: SceneArguments,
+    /// Print one JSON object instead of tables
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `pliant merge`.
+#[derive(Debug, Args)]
+#[command(help_expected = true)]
+pub struct MergeArguments {
+    /// All shards of one campaign (FILE.I-of-N.state.jsonl), in any order
+    #[arg(required = true, value_name = "SHARD")]
+    pub shards: Vec<PathBuf>,
+    /// Results file to write (HDF5)
+    #[arg(long, value_name = "FILE.h5")]
+    pub out: PathBuf,
+    /// Write the envelope to this table
+    #[arg(long, value_name = "FILE")]
+    pub csv: Option<PathBuf>,
+    /// Print one JSON object instead of tables
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// "2/3".
+fn shard(text: &str) -> Result<(usize, usize), String> {
+    let parsed = text.split_once('/').and_then(|(i, n)| Some((i.trim().parse().ok()?, n.trim().parse().ok()?)));
+    parsed.filter(|(i, n)| (1..=*n).contains(i)).ok_or_else(|| "write I/N with I from 1 to N, as in 2/3".to_owned())
 }
 
 /// Arguments of `pliant study`.

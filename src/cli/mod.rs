@@ -19,6 +19,8 @@ mod report;
 mod run;
 mod run_report;
 mod study;
+#[cfg(feature = "hdf5")]
+mod sweep;
 
 use args::{Arguments, Command};
 use clap::{CommandFactory, Parser};
@@ -55,6 +57,14 @@ fn run(arguments: Arguments, output: &mut dyn Write) -> Result<(), Failure> {
         Some(Command::Run(arguments)) => run::run(&arguments, output),
         Some(Command::Eval(arguments)) => eval::run(&arguments, output),
         Some(Command::Study(arguments)) => study::run(&arguments, output),
+        #[cfg(feature = "hdf5")]
+        Some(Command::Sweep(arguments)) => sweep::run(&arguments, output),
+        #[cfg(feature = "hdf5")]
+        Some(Command::Merge(arguments)) => sweep::merge(&arguments, output),
+        #[cfg(not(feature = "hdf5"))]
+        Some(Command::Sweep(_) | Command::Merge(_)) => {
+            Err(Failure::input("this build writes no results files; build with the feature \"hdf5\""))
+        }
         Some(Command::Check(arguments)) => check::run(&arguments, output),
         #[cfg(feature = "hdf5")]
         Some(Command::Export(arguments)) => export::run(&arguments, output),

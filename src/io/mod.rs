@@ -1,6 +1,7 @@
 //! Files to model types and back: the only layer that opens HDF5 files. It uses `model` alone, and holds no physics but the nodal sums that
 //! turn the files of other codes into modal files ([`import`]).
 //! [`results_file`] writes time histories and [`results_reader`] reads them back; what they mean is the business of the layer above.
+//! [`campaign_file`] writes what a campaign leaves: one row per case.
 //! [`field_file`] writes the arrays that exported pictures point into.
 //!
 //! A modal file (schema `flexible-body-modes` 1.0) comes from elsewhere and is never trusted: `guard` decides what may be read
@@ -16,6 +17,7 @@
 //! all. libhdf5 is C code that has looped on damaged variable-length data, so those types are refused by their descriptor before any read.
 
 mod array;
+pub mod campaign_file;
 mod chunks;
 mod digest;
 pub mod error;
@@ -34,6 +36,7 @@ mod modal_writer;
 pub mod results_file;
 pub mod results_reader;
 
+pub use campaign_file::{CampaignFile, CampaignFileError};
 pub use error::ModalFileError;
 pub use header::{Header, NodeMassKind};
 pub use health::{Bound, HealthReport, Rule, RuleResult, Verdict};

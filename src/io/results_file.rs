@@ -222,7 +222,7 @@ pub fn read_series(path: &Path, wanted: &[(String, Option<usize>)]) -> Result<Ve
     wanted.iter().map(|w| read(w).map_err(fail)).collect()
 }
 
-fn write_preface(file: &hdf5::File, preface: &Preface) -> hdf5::Result<()> {
+pub(super) fn write_preface(file: &hdf5::File, preface: &Preface) -> hdf5::Result<()> {
     preface.attributes.iter().try_for_each(|(name, text)| write_text(file, name, text))?;
     for (path, bytes) in &preface.bytes {
         let (group, name) = parent(file, path)?;
@@ -243,7 +243,7 @@ fn write_preface(file: &hdf5::File, preface: &Preface) -> hdf5::Result<()> {
 }
 
 /// The group that holds the last step of `path`, made if need be, and that step.
-fn parent<'p>(file: &hdf5::File, path: &'p str) -> hdf5::Result<(Group, &'p str)> {
+pub(super) fn parent<'p>(file: &hdf5::File, path: &'p str) -> hdf5::Result<(Group, &'p str)> {
     let (groups, name) = path.rsplit_once('/').unwrap_or(("", path));
     let mut group = file.as_group()?;
     for step in groups.split('/').filter(|step| !step.is_empty()) {

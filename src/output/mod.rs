@@ -8,6 +8,7 @@ pub mod closure_load;
 pub mod evaluation;
 #[cfg(feature = "hdf5")]
 pub mod export;
+pub mod extremes;
 pub mod frame;
 pub mod load_pose;
 pub mod picture;

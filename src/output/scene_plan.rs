@@ -6,7 +6,6 @@ use crate::model::Surface;
 use crate::model::{BodyKind, ModeBasis};
 use crate::scene::{Monitor, Scene};
 use std::collections::HashMap;
-use std::rc::Rc;
 use std::sync::Arc;
 
 /// The plan of `scene`; with `picture`, surfaces of all flexible bodies are read, else only those whose stress is wanted.
@@ -29,7 +28,7 @@ pub fn plan(scene: &Scene, picture: bool) -> Result<OutputPlan, ModalFileError> 
         let has_stress = selection.file.stress_location()?.is_some();
         let stress = has_stress && selection.basis.mode_count() > 0 && (scene.stress.contains(body) || monitored(*body));
         if picture || stress {
-            let key = Rc::as_ptr(&selection.basis);
+            let key = Arc::as_ptr(&selection.basis);
             let surface = match shared.get(&key) {
                 Some(surface) => Arc::clone(surface),
                 None => {

@@ -4,6 +4,8 @@ use super::closures::{closure_index, gear_unit};
 use super::error::{SceneError, Source};
 use super::functions::function;
 use super::locate::{Step, first_not_finite};
+#[cfg(feature = "hdf5")]
+use super::modal_files::ModalFiles;
 use super::settings;
 use super::spec::{BodySpec, FunctionSpec, HingeSpec, LoadSpec, MonitorSpec, Numbers, SceneSpec};
 use crate::dynamics::closed_chain::assembly;
@@ -108,6 +110,9 @@ pub struct Scene {
     pub flexible: Vec<(usize, super::modal_files::Selection)>,
     /// What the scene does not need or was told to leave out.
     pub left_out: Vec<String>,
+    /// The scene's keys as they were assembled.
+    #[cfg(feature = "hdf5")]
+    spec: SceneSpec,
     /// What the command line changed.
     #[cfg(feature = "hdf5")]
     overrides: Overrides,
@@ -117,6 +122,13 @@ pub struct Scene {
 }
 
 impl Scene {
+    /// The modal files that were read, for scenes that use the same.
+    #[cfg(feature = "hdf5")]
+    #[must_use]
+    pub fn modal_files(&self) -> ModalFiles {
+        self.files.clone()
+    }
+
     /// The integrator of that name at another accuracy than the scene's; none for a name that is not known.
     #[must_use]
     pub fn method_at(&self, integrator: &str, accuracy: settings::Accuracy) -> Option<Method> {
@@ -144,7 +156,7 @@ impl Scene {
             closure_method: Some(ClosureMethod::TreeAugmented.name().to_owned()),
             ..self.overrides.clone()
         };
-        let scene = assemble_with(self.source.clone(), &all, self.files.clone()).ok()?;
+        let scene = assemble_spec(self.source.clone(), self.spec.clone(), &all, self.files.clone()).ok()?;
         let left_out = self.flexible.iter().filter_map(|(body, selection)| {
             let flexible = scene.system.bodies[*body].flexible()?;
             // a body that is made rigid stays so
@@ -170,26 +182,40 @@ pub fn load(path: &Path, overrides: &Overrides) -> Result<Scene, SceneError> {
 /// # Errors
 /// As [`load`].
 pub fn assemble(source: Source, overrides: &Overrides) -> Result<Scene, SceneError> {
-    assemble_with(source, overrides, Files::default())
+    let spec: SceneSpec = toml::from_str(&source.text).map_err(|e| syntax(&source, &e))?;
+    if let Some(at) = first_not_finite(&source.text) {
+        let message = "the number is not finite; write a finite number".to_owned();
+        return Err(SceneError::Value { path: source.path, at, message });
+    }
+    assemble_spec(source, spec, overrides, Files::default())
+}
+
+/// Assembles the scene of `source` with values put into its keys: `document` is its text, parsed and changed. Errors point into the text
+/// as it was. `files` are modal files that were read before.
+///
+/// # Errors
+/// As [`load`].
+#[cfg(feature = "hdf5")]
+pub fn assemble_document(source: Source, document: toml::Table, overrides: &Overrides, files: ModalFiles) -> Result<Scene, SceneError> {
+    let spec: SceneSpec = document.try_into().map_err(|e| syntax(&source, &e))?;
+    assemble_spec(source, spec, overrides, files)
+}
+
+fn syntax(source: &Source, error: &toml::de::Error) -> SceneError {
+    SceneError::Syntax { path: source.path.clone(), message: error.to_string().trim_end().to_owned() }
 }
 
 #[cfg(feature = "hdf5")]
-type Files = super::modal_files::ModalFiles;
+type Files = ModalFiles;
 /// No modal files without the feature.
 #[cfg(not(feature = "hdf5"))]
 #[derive(Default)]
 struct Files;
 
 /// As [`assemble`], with the modal files `files` already read.
-fn assemble_with(source: Source, overrides: &Overrides, files: Files) -> Result<Scene, SceneError> {
+fn assemble_spec(source: Source, spec: SceneSpec, overrides: &Overrides, files: Files) -> Result<Scene, SceneError> {
     #[cfg(not(feature = "hdf5"))]
     let Files = files;
-    let spec: SceneSpec = toml::from_str(&source.text)
-        .map_err(|e| SceneError::Syntax { path: source.path.clone(), message: e.to_string().trim_end().to_owned() })?;
-    if let Some(at) = first_not_finite(&source.text) {
-        let message = "the number is not finite; write a finite number".to_owned();
-        return Err(SceneError::Value { path: source.path, at, message });
-    }
     check_overrides(&spec, overrides)?;
     let mut assembly = Assembly {
         source: &source,
@@ -262,6 +288,8 @@ fn assemble_with(source: Source, overrides: &Overrides, files: Files) -> Result<
         #[cfg(feature = "hdf5")]
         flexible,
         left_out,
+        #[cfg(feature = "hdf5")]
+        spec,
         #[cfg(feature = "hdf5")]
         overrides: overrides.clone(),
         #[cfg(feature = "hdf5")]
@@ -494,7 +522,7 @@ impl Assembly<'_> {
         })
     }
 
-    fn load(&self, index: usize, load: &LoadSpec, spec: &SceneSpec, definition: &Definition) -> Result<LoadDefinition, SceneError> {
+    fn load(&mut self, index: usize, load: &LoadSpec, spec: &SceneSpec, definition: &Definition) -> Result<LoadDefinition, SceneError> {
         let at = |key| [Step::Key("load"), Step::Index(index), Step::Key(key)];
         let whole = [Step::Key("load"), Step::Index(index)];
         let of = |spec: &Option<FunctionSpec>, key| -> Result<Option<TimeFunction>, SceneError> {
@@ -527,7 +555,7 @@ impl Assembly<'_> {
     }
 
     #[cfg(not(feature = "hdf5"))]
-    fn mesh_node(&self, index: usize, _node: usize, _number: Option<usize>) -> Result<PointDefinition, SceneError> {
+    fn mesh_node(&mut self, index: usize, _node: usize, _number: Option<usize>) -> Result<PointDefinition, SceneError> {
         Err(self.source.value(&[Step::Key("load"), Step::Index(index), Step::Key("mesh_node")], "mesh nodes belong to flexible bodies"))
     }
 }

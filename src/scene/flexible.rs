@@ -116,14 +116,13 @@ impl Assembly<'_> {
         self.overrides.modes.is_some() || self.overrides.rigid.contains(&body.name)
     }
 
-    pub(super) fn mesh_node(&self, index: usize, node: usize, number: Option<usize>) -> Result<PointDefinition, SceneError> {
+    pub(super) fn mesh_node(&mut self, index: usize, node: usize, number: Option<usize>) -> Result<PointDefinition, SceneError> {
         let steps = [Step::Key("load"), Step::Index(index), Step::Key("mesh_node")];
         let Some((_, selection)) = self.chosen.iter().find(|(n, _)| Some(*n) == number) else {
             return Err(self.source.value(&steps, "mesh nodes belong to flexible bodies; name a point instead"));
         };
         let wrap = |source| SceneError::ModalFile { path: self.source.path.clone(), at: self.source.at(&steps), source };
-        let position = selection.file.node_position(node).map_err(wrap)?;
-        let shape = selection.file.node_shape(node).map_err(wrap)?;
+        let (position, shape) = self.files.node(selection, node).map_err(wrap)?;
         let mode_shape = selection.basis.combine(&shape, Vector6::zeros());
         Ok(PointDefinition::Node { position, mode_shape, rotations: selection.file.has_rotation() })
     }

@@ -7,13 +7,15 @@ pub mod error;
 mod flexible;
 mod functions;
 pub mod import_spec;
-mod locate;
+pub mod key_path;
+pub mod locate;
 #[cfg(feature = "hdf5")]
-mod modal_files;
+pub mod modal_files;
 pub mod settings;
 pub mod spec;
 
 pub use assemble::{Monitor, Overrides, Scene};
 pub use error::SceneError;
 pub use import_spec::ImportSpec;
+pub use key_path::{KeyFault, KeyPath};
 pub use settings::Accuracy;

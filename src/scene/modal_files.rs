@@ -8,20 +8,20 @@ use crate::model::ModeBasis;
 use crate::model::flexible_body::ModalIntegrals;
 use crate::model::modal_body::ModalBody;
 use crate::model::mode_basis::{NoStaticAnswer, interface_loads, shape_loads};
+use nalgebra::{Vector3, Vector6};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
-use std::rc::Rc;
 use std::sync::Arc;
 
 /// One choice of modes of one file.
 #[derive(Debug, Clone)]
 pub struct Selection {
     /// The file, for surfaces and nodes.
-    pub file: Rc<ModalFile>,
+    pub file: Arc<ModalFile>,
     /// Modal integrals of all modes of the file.
-    pub all: Rc<ModalBody>,
+    pub all: Arc<ModalBody>,
     /// The retained modes.
-    pub basis: Rc<ModeBasis>,
+    pub basis: Arc<ModeBasis>,
     /// The file's content digest.
     pub content_sha256: String,
 }
@@ -30,15 +30,25 @@ pub struct Selection {
 type Packed = (Arc<ModalBody>, Arc<ModalIntegrals>);
 
 /// A file, its integrals and its digest.
-type Opened = (Rc<ModalFile>, Rc<ModalBody>, String);
+type Opened = (Arc<ModalFile>, Arc<ModalBody>, String);
 
-/// Files and selections read so far.
+/// Place (m) of a mesh node and its shape in each mode of its file.
+type Node = (Vector3<f64>, Arc<Vec<Vector6<f64>>>);
+
+/// Files and selections read so far. A clone shares what was read.
 #[derive(Debug, Clone, Default)]
 pub struct ModalFiles {
     files: HashMap<PathBuf, Opened>,
-    bases: HashMap<(PathBuf, Choice), Rc<ModeBasis>>,
+    bases: HashMap<(PathBuf, Choice), Arc<ModeBasis>>,
     packed: HashMap<(PathBuf, Choice, bool), Packed>,
+    /// By content of the file and number of the node.
+    nodes: HashMap<(String, usize), Node>,
 }
+
+/// Most files, selections and nodes that are taken over from other scenes.
+const MOST_FILES: usize = 32;
+const MOST_SELECTIONS: usize = 128;
+const MOST_NODES: usize = 4096;
 
 /// A choice of modes of one file.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Default)]
@@ -78,7 +88,7 @@ impl ModalFiles {
         let wrap = |error: ModalFileError| SceneError::ModalFile { path: source.path.clone(), at: source.at(steps), source: error };
         let (file, body) = ModalFile::load_body(path).map_err(wrap)?;
         let digest = file.header().content_sha256.clone();
-        let entry = (Rc::new(file), Rc::new(body), digest);
+        let entry = (Arc::new(file), Arc::new(body), digest);
         self.files.insert(path.to_owned(), entry.clone());
         Ok(entry)
     }
@@ -98,7 +108,7 @@ impl ModalFiles {
         let wrap = |source_error| SceneError::Import { path: source.path.clone(), at: source.at(steps), source: source_error };
         let (file, body) = import(path, options).map_err(wrap)?;
         let digest = file.header().content_sha256.clone();
-        let entry = (Rc::new(file), Rc::new(body), digest);
+        let entry = (Arc::new(file), Arc::new(body), digest);
         self.files.insert(key.clone(), entry.clone());
         Ok((key, entry))
     }
@@ -107,10 +117,10 @@ impl ModalFiles {
     ///
     /// # Errors
     /// If a node has no shape, or static loads no answer.
-    pub fn basis(&mut self, path: &Path, file: &ModalFile, body: &ModalBody, choice: &Choice) -> Result<Rc<ModeBasis>, BasisError> {
+    pub fn basis(&mut self, path: &Path, file: &ModalFile, body: &ModalBody, choice: &Choice) -> Result<Arc<ModeBasis>, BasisError> {
         let key = (path.to_owned(), choice.clone());
         if let Some(found) = self.bases.get(&key) {
-            return Ok(Rc::clone(found));
+            return Ok(Arc::clone(found));
         }
         let basis = match &choice.residual {
             None => ModeBasis::whole(choice.whole.clone(), body.mode_count()),
@@ -123,9 +133,39 @@ impl ModalFiles {
                 ModeBasis::with_residual(body, choice.whole.clone(), &loads)?
             }
         };
-        let basis = Rc::new(basis);
-        self.bases.insert(key, Rc::clone(&basis));
+        let basis = Arc::new(basis);
+        self.bases.insert(key, Arc::clone(&basis));
         Ok(basis)
+    }
+
+    /// Place and shapes of a mesh node of the selected file.
+    ///
+    /// # Errors
+    /// If the node cannot be read.
+    pub fn node(&mut self, selection: &Selection, node: usize) -> Result<Node, ModalFileError> {
+        let key = (selection.content_sha256.clone(), node);
+        if let Some(found) = self.nodes.get(&key) {
+            return Ok(found.clone());
+        }
+        let read = (selection.file.node_position(node)?, Arc::new(selection.file.node_shape(node)?));
+        self.nodes.insert(key, read.clone());
+        Ok(read)
+    }
+
+    /// Takes over what `other` has read beside, up to a bound: values that differ from scene to scene must not fill the memory.
+    pub fn absorb(&mut self, other: Self) {
+        fn take<K: Eq + std::hash::Hash, V>(into: &mut HashMap<K, V>, from: HashMap<K, V>, most: usize) {
+            for (key, value) in from {
+                if into.len() >= most {
+                    break;
+                }
+                into.entry(key).or_insert(value);
+            }
+        }
+        take(&mut self.files, other.files, MOST_FILES);
+        take(&mut self.bases, other.bases, MOST_SELECTIONS);
+        take(&mut self.packed, other.packed, MOST_SELECTIONS);
+        take(&mut self.nodes, other.nodes, MOST_NODES);
     }
 
     /// The body with the modes `basis` of `choice`, packed with or without its geometric stiffness.
