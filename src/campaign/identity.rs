@@ -1,11 +1,11 @@
 //! What decides the numbers of a campaign, piece by piece, so that what differs can be named.
 
-use super::plan::{Parameter, Plan, Values};
+use super::plan::{Plan, Values};
 use crate::scene::Scene;
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::path::Path;
-use toml::Value;
+use toml::{Table, Value};
 
 /// Digest of each piece by its name in messages.
 pub type Identity = BTreeMap<String, String>;
@@ -14,9 +14,10 @@ fn digest(bytes: impl AsRef<[u8]>) -> String {
     Sha256::digest(bytes).iter().map(|b| format!("{b:02x}")).collect()
 }
 
-/// The identity of a campaign over `scene`, which is the scene without any parameter; `options` are what the command line changes.
+/// The identity of a campaign over `scene`, which is the scene without any parameter, with its parsed text `document`; `options` are what
+/// the command line changes.
 #[must_use]
-pub fn identity(scene: &Scene, plan: &Plan, options: &str) -> Identity {
+pub fn identity(scene: &Scene, document: &Table, plan: &Plan, options: &str) -> Identity {
     let mut pieces = Identity::new();
     let mut add = |what: String, digest: String| {
         pieces.insert(what, digest);
@@ -31,32 +32,31 @@ pub fn identity(scene: &Scene, plan: &Plan, options: &str) -> Identity {
     for (body, selection) in &scene.flexible {
         add(format!("the modal file of body \"{}\"", scene.system.bodies[*body].name), selection.content_sha256.clone());
     }
-    // tables of time functions are in files of their own
-    let hinges: Vec<_> = scene.system.bodies.iter().map(|b| format!("{:?}", b.hinge)).collect();
-    add("a table that the scene reads".into(), digest(format!("{:?}{hinges:?}", scene.system.loads)));
+    // tables of time functions, and files that parameters choose
+    let mut names = Vec::new();
+    document.iter().for_each(|(key, value)| texts(key, value, &mut names));
+    for parameter in &plan.parameters {
+        let (Values::Random(_, values) | Values::Listed { values, .. }) = &parameter.values;
+        values.iter().for_each(|value| texts("", value, &mut names));
+    }
     let folder = scene.source.path.parent().unwrap_or(Path::new(""));
-    for file in plan.parameters.iter().flat_map(texts) {
-        if let Ok(bytes) = std::fs::read(folder.join(file)) {
-            add(format!("the file {file}"), digest(bytes));
+    for name in names {
+        if let Ok(bytes) = std::fs::read(folder.join(name)) {
+            add(format!("the file {name}"), digest(bytes));
         }
     }
     pieces
 }
 
-/// Texts among the values of a parameter: some of them name files.
-fn texts(parameter: &Parameter) -> Vec<&str> {
-    fn of<'v>(value: &'v Value, into: &mut Vec<&'v str>) {
-        match value {
-            Value::String(text) if !into.contains(&text.as_str()) => into.push(text),
-            Value::Array(list) => list.iter().for_each(|v| of(v, into)),
-            Value::Table(table) => table.iter().for_each(|(_, v)| of(v, into)),
-            _ => {}
-        }
+/// Texts in a value, some of which name files; those of bodies are known by their content.
+fn texts<'v>(key: &str, value: &'v Value, into: &mut Vec<&'v str>) {
+    match value {
+        _ if ["modal_file", "import"].contains(&key) => {}
+        Value::String(text) if !text.is_empty() && !into.contains(&text.as_str()) => into.push(text),
+        Value::Array(list) => list.iter().for_each(|v| texts(key, v, into)),
+        Value::Table(table) => table.iter().for_each(|(key, v)| texts(key, v, into)),
+        _ => {}
     }
-    let (Values::Random(_, values) | Values::Listed { values, .. }) = &parameter.values;
-    let mut found = Vec::new();
-    values.iter().for_each(|v| of(v, &mut found));
-    found
 }
 
 /// Names of the pieces that differ.

@@ -70,7 +70,7 @@ impl Campaign {
         let parameters = plan.parameters.iter().map(|p| ParameterRecord { name: p.name.clone(), keys: p.stream(), scale: p.scale });
         let header = Header {
             pliant_campaign: records::VERSION.into(),
-            identity: identity(&base, &plan, &format!("{overrides:?}")),
+            identity: identity(&base, &document, &plan, &format!("{overrides:?}")),
             shard: Shard::WHOLE,
             cases: plan.cases(),
             scene_name: base.name.clone(),

@@ -226,20 +226,30 @@ pub(super) fn write_preface(file: &hdf5::File, preface: &Preface) -> hdf5::Resul
     preface.attributes.iter().try_for_each(|(name, text)| write_text(file, name, text))?;
     for (path, bytes) in &preface.bytes {
         let (group, name) = parent(file, path)?;
-        group.new_dataset_builder().with_data(bytes.as_slice()).create(name)?;
+        group.new_dataset_builder().with_data(bytes.as_slice()).obj_track_times(false).create(name)?;
     }
     for (path, attributes) in &preface.groups {
         let (above, name) = parent(file, path)?;
-        let group = if above.link_exists(name) { above.group(name)? } else { above.create_group(name)? };
+        let group = if above.link_exists(name) { above.group(name)? } else { new_group(&above, name)? };
         attributes.iter().try_for_each(|(name, text)| write_text(&group, name, text))?;
     }
     for (path, matrix) in &preface.matrices {
         let (group, name) = parent(file, path)?;
         // rows first in the file, columns first in memory
         let rows = matrix.transpose();
-        group.new_dataset::<f64>().shape((matrix.nrows(), matrix.ncols())).create(name)?.write_raw(rows.as_slice())?;
+        group
+            .new_dataset::<f64>()
+            .shape((matrix.nrows(), matrix.ncols()))
+            .obj_track_times(false)
+            .create(name)?
+            .write_raw(rows.as_slice())?;
     }
     Ok(())
+}
+
+/// A group without the time at which it was made: the same content shall make the same bytes.
+fn new_group(above: &Group, name: &str) -> hdf5::Result<Group> {
+    above.create_group_builder().obj_track_times(false).create(name)
 }
 
 /// The group that holds the last step of `path`, made if need be, and that step.
@@ -247,7 +257,7 @@ pub(super) fn parent<'p>(file: &hdf5::File, path: &'p str) -> hdf5::Result<(Grou
     let (groups, name) = path.rsplit_once('/').unwrap_or(("", path));
     let mut group = file.as_group()?;
     for step in groups.split('/').filter(|step| !step.is_empty()) {
-        group = if group.link_exists(step) { group.group(step)? } else { group.create_group(step)? };
+        group = if group.link_exists(step) { group.group(step)? } else { new_group(&group, step)? };
     }
     Ok((group, name))
 }
