@@ -21,3 +21,4 @@ environment() {
 }
 environment .venv scripts/requirements.txt "cmake, the viewer and the Python packages (about 2 minutes)"
 environment .venv/nastran scripts/requirements-nastran.txt "pyNastran"
+environment .venv/dask scripts/requirements-dask.txt "Dask"
