@@ -3,6 +3,7 @@
 import argparse
 import json
 import math
+import os
 import pathlib
 import re
 import subprocess
@@ -194,12 +195,32 @@ def residual_table():
     return "\n".join("| " + " | ".join(row) + " |" for row in rows)
 
 
+def campaign_table():
+    """Cases per second on one thread and on all; a figure is cut, never rounded up."""
+    def cut(value, digits):
+        return f"{math.floor(value * 10**digits) / 10**digits:.{digits}f}"
+
+    sys.path.insert(0, str(ROOT / "scripts" / "campaign"))
+    from speedup import measure
+
+    example = ROOT / "examples" / "12_campaign"
+    found = measure(example / "scene.toml", example / "plan.toml", len(os.sched_getaffinity(0)), 9)
+    return "\n".join([
+        "| campaign of 120 cases of 8 s | cases a second |",
+        "| --- | --- |",
+        f"| 1 thread | {cut(found['rate_one'], 1)} |",
+        f"| {found['threads']} threads on {found['threads']} cores | {cut(found['rate_all'], 1)} |",
+        f"| speed-up per core, median and least of {found['rounds']} rounds | {cut(found['per_core'], 3)}, {cut(found['per_core_least'], 3)} |",
+    ])
+
+
 TABLES = {
     "validation": validation_table,
     "stability": stability_table,
     "loops": loops_table,
     "study": study_table,
     "residual": residual_table,
+    "campaign": campaign_table,
 }
 
 

@@ -294,7 +294,7 @@ fn a_case_that_fails_is_recorded_and_the_others_go_on() {
     let found = folder.run(3, "table.csv", "out.h5", &[]);
     assert_eq!((found["completed"].as_u64(), found["failed"].as_u64()), (Some(2), Some(2)));
     let message = found["failures"][0]["message"].as_str().unwrap();
-    assert!(found["failures"][0]["case"] == 2 && message.contains("body[1].mass") && message.contains("scene.toml:"), "{message}");
+    assert!(found["failures"][0]["case"] == 2 && message.starts_with("scene.toml:8:8: body[1].mass: "), "{message}");
     assert!(found["failures"][1]["message"].as_str().unwrap().contains("\"euler\" is not an integrator"), "{found}");
     let file = hdf5::File::open(folder.path("out.h5")).unwrap();
     assert_eq!(file.dataset("cases/completed").unwrap().read_raw::<i64>().unwrap(), [1, 0, 1, 0]);
@@ -475,4 +475,40 @@ fn what_cannot_be_swept_is_refused_before_anything_runs() {
     let scene = fs::read_to_string(folder.path("scene.toml")).unwrap();
     fs::write(folder.path("scene.toml"), scene.replace("duration", "largest_step")).unwrap();
     assert!(folder.refused("plan.toml", &[]).contains("the scene has no [simulation] duration"));
+}
+
+#[test]
+fn the_plan_of_the_readme_fits_the_example() {
+    let readme = fs::read_to_string(root().join("README.md")).unwrap();
+    let block = readme.split("```toml\n").find(|t| t.starts_with("seed = ")).and_then(|t| t.split("```").next()).unwrap();
+    let folder = Folder::new(block);
+    folder.write("cases.csv", "hinge.right_line.damping\n0.5\n0.6\n");
+    let shown = pliant(&["sweep", &example("12_campaign"), &folder.path("plan.toml"), "--show-case", "240"]);
+    assert!(shown.status.success(), "{}", text(&shown.stderr));
+    let scene: toml::Table = text(&shown.stdout).parse().unwrap();
+    // the last row of the table, the last value of the grid
+    assert_eq!(scene["hinge"][4]["damping"].as_float(), Some(0.6));
+    assert_eq!(scene["hinge"][1]["position"][0].as_float(), Some(std::f64::consts::FRAC_PI_2));
+    let factor = scene["hinge"][2]["stiffness"].as_float().unwrap() / 400.0;
+    assert!(factor != 1.0 && (0.7..=1.3).contains(&factor), "{factor}");
+}
+
+#[test]
+#[cfg(unix)]
+fn ctrl_c_ends_a_campaign_with_what_is_finished() {
+    let folder = Folder::new(PLAN);
+    let slow = ["--duration", "100", "--threads", "2"];
+    let arguments = folder.sweep("plan.toml", "out.h5", &slow);
+    let child = command(&arguments.iter().map(String::as_str).collect::<Vec<_>>()).spawn().unwrap();
+    let (state, started) = (folder.path("out.state.jsonl"), Instant::now());
+    while fs::read_to_string(&state).map_or(0, |text| text.matches('\n').count()) < 2 {
+        assert!(started.elapsed() < Duration::from_secs(60));
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    let done = child.wait_with_output().unwrap();
+    let message = text(&done.stderr);
+    assert_eq!(done.status.code(), Some(3), "{message}");
+    assert!(message.contains("interrupted with ") && message.contains(" of 12 cases finished; they are in "), "{message}");
+    assert!(Path::new(&state).exists() && !Path::new(&folder.path("out.h5")).exists());
 }

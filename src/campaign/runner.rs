@@ -125,7 +125,7 @@ impl Campaign {
         match ran.unwrap_or_else(|_| Err("the program failed within this case; please report the scene and the values".into())) {
             Ok(None) => return None,
             Ok(Some(loads)) => record.loads = loads,
-            Err(fault) => record.failure = Some(fault),
+            Err(fault) => record.failure = Some(self.without_folder(&fault)),
         }
         record.wall_s = started.elapsed().as_secs_f64();
         Some(record)
@@ -150,6 +150,14 @@ impl Campaign {
         }
         let loads = tracker.finish().filter(|loads| loads.iter().zip(&widths).all(|(e, &width)| e.is_whole(width)));
         loads.map(Some).ok_or_else(|| "a load left finite numbers".into())
+    }
+
+    /// A message without the folder of the scene: results shall not depend on where they were computed.
+    fn without_folder(&self, message: &str) -> String {
+        match self.source.path.parent() {
+            Some(folder) if !folder.as_os_str().is_empty() => message.replace(&folder.join("").display().to_string(), ""),
+            _ => message.to_owned(),
+        }
     }
 
     fn assemble(&self, values: &[Value]) -> Result<Scene, Fault> {
