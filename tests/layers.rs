@@ -7,9 +7,11 @@ use std::path::{Path, PathBuf};
 const LAYERS: [&str; 10] = ["spatial", "model", "dynamics", "integrate", "io", "scene", "output", "study", "campaign", "cli"];
 
 /// Foreign crates that only some places may use.
-const CONFINED: [(&str, &[&str]); 9] = [
+const CONFINED: [(&str, &[&str]); 11] = [
     ("plotters", &["src/study/plot.rs"]),
     ("hdf5::", &["src/io/"]),
+    ("ndarray::", &["src/io/"]),
+    ("rand_distr::", &["src/campaign/draw.rs"]),
     ("quick_xml", &["src/io/"]),
     ("rerun::", &["src/output/rerun/"]),
     ("clap", &["src/cli/"]),

@@ -1,6 +1,6 @@
 //! The envelope over cases: largest and smallest value of every component of every load, with what acted beside it, the case and the time.
 
-use super::records::{CaseRecord, Header, Shard};
+use super::record::{CaseRecord, Header, Shard};
 use crate::output::evaluation::Named;
 use crate::output::extremes::Sense;
 use serde::Serialize;

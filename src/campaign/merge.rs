@@ -2,7 +2,8 @@
 
 use super::error::CampaignError;
 use super::identity::differences;
-use super::records::{CaseRecord, Header, Records, Shard};
+use super::record::{CaseRecord, Header, Shard};
+use super::records::Records;
 use std::path::PathBuf;
 
 /// Where the records of a whole campaign are read: one file, or one for each shard.

@@ -3,7 +3,7 @@
 use super::envelope::{CampaignReport, Envelope, LoadEnvelope, plain};
 use super::error::CampaignError;
 use super::merge::Whole;
-use super::records::{CaseRecord, Header, LoadRecord};
+use super::record::{CaseRecord, Header, LoadRecord, ModalFileEntry};
 use crate::io::CampaignFile;
 use crate::io::campaign_file::{Array, BLOCK_ROWS, CellKind, Cells, Column, TEXT_LIMIT};
 use crate::io::results_file::{Preface, escape};
@@ -79,7 +79,7 @@ fn complete(whole: &mut Whole, case: usize) -> Result<CaseRecord, CampaignError>
 }
 
 fn preface(header: &Header) -> Preface {
-    let modal_file = |entry: &super::records::ModalFileEntry| {
+    let modal_file = |entry: &ModalFileEntry| {
         (format!("scene/modal_files/{}", escape(&entry.body)), vec![("content_sha256", entry.content_sha256.clone())])
     };
     Preface {

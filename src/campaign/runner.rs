@@ -6,7 +6,8 @@
 use super::error::CampaignError;
 use super::identity::identity;
 use super::plan::Plan;
-use super::records::{self, CaseRecord, Header, LoadRecord, ModalFileEntry, ParameterRecord, Records, Shard};
+use super::record::{CaseRecord, Header, LoadRecord, ModalFileEntry, ParameterRecord, Shard, VERSION};
+use super::records::Records;
 use crate::integrate::{Flow, Observer, Outcome, Sample, Settings, simulate};
 use crate::output::channels::{CLOSURE_POINT, closure_frame, closure_side, load_frame, load_side};
 use crate::output::extremes::{Extremes, ExtremesTracker, LoadPlace};
@@ -69,7 +70,7 @@ impl Campaign {
         });
         let parameters = plan.parameters.iter().map(|p| ParameterRecord { name: p.name.clone(), keys: p.stream(), scale: p.scale });
         let header = Header {
-            pliant_campaign: records::VERSION.into(),
+            pliant_campaign: VERSION.into(),
             identity: identity(&base, &document, &plan, &format!("{overrides:?}")),
             shard: Shard::WHOLE,
             cases: plan.cases(),

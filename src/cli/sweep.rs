@@ -5,8 +5,7 @@ use super::failure::{Failure, with_causes};
 use super::report::{Align, Table, number};
 use crate::campaign::envelope::{LoadEnvelope, plain};
 use crate::campaign::merge::Whole;
-use crate::campaign::records::Shard;
-use crate::campaign::{Campaign, CampaignError, CampaignReport, CaseRecord, Plan, Records, Watch, results};
+use crate::campaign::{Campaign, CampaignError, CampaignReport, CaseRecord, Plan, Records, Shard, Watch, results};
 use crate::output::evaluation::Named;
 use crate::scene::Overrides;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -176,7 +175,7 @@ fn ended(report: &CampaignReport) -> Result<(), Failure> {
     let all = report.completed + report.failed;
     let file = &report.file;
     Err(Failure::Stopped(format!(
-        "{} of {} failed and are not in the envelope; {file} says why for each",
+        "{} of {} failed and count for nothing in the envelope; {file} says why for each",
         report.failed,
         counted(all, "case")
     )))
@@ -214,7 +213,7 @@ fn write_tables(report: &CampaignReport, output: &mut dyn Write) -> Result<(), F
     ];
     for (what, envelopes, title) in headings {
         if envelopes.iter().any(|(_, envelope)| !envelope.rows.is_empty()) {
-            writeln!(output, "\nenvelope of {title}; each row is one instant:")?;
+            writeln!(output, "\nenvelope of {title}; each row is one instant; zeros are left out:")?;
             table(what, envelopes).write(output)?;
         }
     }
@@ -228,6 +227,12 @@ fn write_tables(report: &CampaignReport, output: &mut dyn Write) -> Result<(), F
     Ok(())
 }
 
+/// What is rounding beside the largest component of a load; a moment stands beside forces on arms of 1 m.
+fn rounding(envelope: &LoadEnvelope) -> f64 {
+    1e-9 * envelope.rows.iter().map(|row| row.value.abs()).fold(0.0, f64::max)
+}
+
+/// One line per row of the envelopes but those of components in which nothing happens.
 fn table(what: &str, envelopes: &Named<LoadEnvelope>) -> Table {
     let right = Align::Right;
     let mut table = Table::new(&[
@@ -243,7 +248,8 @@ fn table(what: &str, envelopes: &Named<LoadEnvelope>) -> Table {
         ("at (s)", right),
     ]);
     for (name, envelope) in envelopes.iter() {
-        for (index, row) in envelope.rows.iter().enumerate() {
+        let noise = rounding(envelope);
+        for (index, row) in envelope.rows.iter().enumerate().filter(|(_, row)| row.value.abs() > noise) {
             let unit = &envelope.units[index % envelope.units.len()];
             let mut cells = vec![name.to_owned(), format!("{} {}", row.extreme, row.component.replace('_', " "))];
             if row.load.len() > 1 {
