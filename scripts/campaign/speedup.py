@@ -20,8 +20,8 @@ PROGRAM = ROOT / "target" / "release" / "pliant"
 
 # cores that others may take
 QUIET = 0.05
-# rounds that are tried for each one that counts
-TRIES = 4
+# how long a quiet moment is waited for before a sweep, and how long all rounds may take (s)
+PATIENCE, LONGEST = 120.0, 360.0
 
 
 def machine_seconds():
@@ -34,6 +34,16 @@ def own_seconds():
     """Core seconds of the sweeps so far and of this script."""
     usage = [resource.getrusage(who) for who in (resource.RUSAGE_CHILDREN, resource.RUSAGE_SELF)]
     return sum(u.ru_utime + u.ru_stime for u in usage)
+
+
+def wait_for_quiet():
+    """Returns when the machine does nothing else, or when patience is at its end."""
+    end = time.monotonic() + PATIENCE
+    while time.monotonic() < end:
+        before = machine_seconds()
+        time.sleep(0.5)
+        if machine_seconds() - before < 0.5 * QUIET:
+            return
 
 
 def rate(scene, plan, threads, options):
@@ -52,17 +62,17 @@ def rate(scene, plan, threads, options):
 
 def measure(scene, plan, threads, rounds, options=()):
     """Median rates on one thread and on all, and the speed-up per core: the median over the rounds of rate(all) / (threads rate(1))."""
-    pairs = []
-    for number in range(TRIES * rounds):
+    pairs, end, number = [], time.monotonic() + LONGEST, 0
+    while len(pairs) < rounds and time.monotonic() < end:
+        number += 1
         order = (1, threads) if number % 2 else (threads, 1)
+        wait_for_quiet()
         found = {count: rate(scene, plan, count, options) for count in order}
         others = max(taken for _, taken in found.values())
         counts = others <= QUIET
         print(f"{found[1][0]:.1f} and {found[threads][0]:.1f} cases/s" + ("" if counts else f", not counted: others took {others:.2f} cores"), file=sys.stderr)
         if counts:
             pairs.append((found[1][0], found[threads][0]))
-        if len(pairs) == rounds:
-            break
     if not pairs:
         sys.exit("the machine was never quiet; end what else runs and try again")
     return {
@@ -82,8 +92,8 @@ def main():
     parser.add_argument("plan", nargs="?", type=pathlib.Path, default=example / "plan.toml")
     parser.add_argument("--threads", type=int, default=len(os.sched_getaffinity(0)), help="[default: one for each core]")
     parser.add_argument("--rounds", type=int, default=9)
-    arguments = parser.parse_args()
-    print(json.dumps(measure(arguments.scene, arguments.plan, arguments.threads, arguments.rounds), indent=2))
+    arguments, options = parser.parse_known_args()
+    print(json.dumps(measure(arguments.scene, arguments.plan, arguments.threads, arguments.rounds, options), indent=2))
 
 
 if __name__ == "__main__":
