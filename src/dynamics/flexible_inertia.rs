@@ -67,9 +67,8 @@ impl FlexibleInertia {
             for (p, e) in integrals.momentum.iter().zip(eta) {
                 first_moment += p * *e;
             }
-            let sum = |planes: &[f64]| Matrix3::from_fn(|a, b| dot(&planes[(3 * a + b) * n..][..n], eta));
-            let undeformed = sum(&integrals.shape_position).transpose();
-            let other = if order == InertiaOrder::Second { sum(&self.W) } else { undeformed.transpose() };
+            let undeformed = contract(&integrals.shape_position, eta).transpose();
+            let other = if order == InertiaOrder::Second { contract(&self.W, eta) } else { undeformed.transpose() };
             second_moment += undeformed + other;
         }
         let second_order = if order >= InertiaOrder::First { integrals.second_order.as_slice() } else { &[] };
@@ -111,7 +110,7 @@ impl FlexibleInertia {
     ) -> Vector6<f64> {
         let n = integrals.mode_count();
         // D_ab = int rho u_dot_a x_b
-        let D = Matrix3::from_fn(|a, b| dot(&self.W[(3 * a + b) * n..][..n], eta_dot));
+        let D = contract(&self.W, eta_dot);
         let momentum: Vector3<f64> = self.row.iter().zip(eta_dot).map(|(r, e)| linear(r) * *e).sum();
         let moment = omega.cross(&(self.inertia * omega)) + (omega * D.trace() - D * omega) * 2.0;
         let force = omega.cross(&omega.cross(&self.first_moment)) + omega.cross(&momentum) * 2.0;
@@ -139,6 +138,27 @@ impl FlexibleInertia {
     }
 }
 
+/// `a . b` by four sums that do not wait for each other.
 fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
+    let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<4>(), b.as_chunks::<4>());
+    let mut sums = [0.0; 4];
+    for (a, b) in a.iter().zip(b) {
+        for i in 0..4 {
+            sums[i] += a[i] * b[i];
+        }
+    }
+    let rest: f64 = a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum();
+    (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
+}
+
+/// The nine `planes . x`, n numbers each, by tensor component.
+fn contract(planes: &[f64], x: &[f64]) -> Matrix3<f64> {
+    let n = x.len();
+    let mut out = Matrix3::zeros();
+    for a in 0..3 {
+        for b in 0..3 {
+            out[(a, b)] = dot(&planes[(3 * a + b) * n..][..n], x);
+        }
+    }
+    out
 }

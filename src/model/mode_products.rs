@@ -95,13 +95,13 @@ impl ModeProducts {
         for (component, out) in out.chunks_exact_mut(n).enumerate().take(9) {
             let (a, b) = (component / 3, component % 3);
             let symmetric = sums.plane(self.blocks, self.plane_of[component]);
-            out.iter_mut().zip(symmetric).for_each(|(o, x)| *o += x);
+            add_scaled(1.0, symmetric, out);
             if a != b {
                 // P_ba - P_ab of the plane's own (a, b) is what it holds
                 let c = 3 - a - b;
                 let sign = if AXES[c] == (b, a) { 0.5 } else { -0.5 };
                 let cross = sums.plane(self.blocks, self.symmetric + c);
-                out.iter_mut().zip(cross).for_each(|(o, x)| *o += sign * x);
+                add_scaled(sign, cross, out);
             }
         }
     }
@@ -110,7 +110,7 @@ impl ModeProducts {
     pub fn add_coriolis(&self, sums: &ProductSums, factors: [f64; CROSS], out: &mut [f64]) {
         for (c, factor) in factors.into_iter().enumerate() {
             let cross = sums.plane(self.blocks, self.symmetric + CROSS + c);
-            out.iter_mut().zip(cross).for_each(|(o, x)| *o += factor * x);
+            add_scaled(factor, cross, out);
         }
     }
 }
@@ -132,9 +132,22 @@ impl ProductSums {
         self.processor.run(Multiply { products, eta: &self.eta, rate: &self.rate, sums: &mut self.sums });
     }
 
-    /// What the pass left of one plane, one number per mode.
-    fn plane(&self, blocks: usize, plane: usize) -> impl Iterator<Item = &f64> {
-        self.sums[plane * blocks..(plane + 1) * blocks].iter().flatten()
+    /// What the pass left of one plane, four modes at a time.
+    fn plane(&self, blocks: usize, plane: usize) -> &[[f64; 4]] {
+        &self.sums[plane * blocks..(plane + 1) * blocks]
+    }
+}
+
+/// `out += factor x`, one number per mode.
+fn add_scaled(factor: f64, x: &[[f64; 4]], out: &mut [f64]) {
+    let (whole, rest) = out.as_chunks_mut::<4>();
+    for (out, x) in whole.iter_mut().zip(x) {
+        for i in 0..4 {
+            out[i] += factor * x[i];
+        }
+    }
+    if let Some(x) = x.last() {
+        rest.iter_mut().zip(x).for_each(|(o, x)| *o += factor * x);
     }
 }
 

@@ -7,12 +7,12 @@
 //!
 //! | pass | leaves | numbers per body |
 //! |---|---|---|
-//! | [`outward`]: attitude and angular velocity | [`Motion`] | 12 |
-//! | [`inward`]: articulated inertias, residual forces | [`Gain`] | 8 |
-//! | the same, where loads are asked for | [`Outboard`] | 36 |
-//! | [`accelerate`]: accelerations and loads | the load, in place of the above | |
+//! | `outward`: attitude and angular velocity | `Motion` | 12 |
+//! | `inward`: articulated inertias, residual forces | `Gain` | 8 |
+//! | the same, where loads are asked for | `Outboard` | 36 |
+//! | `accelerate`: accelerations and loads | the load, in place of the above | |
 //!
-//! Modes are the business of [`flexible`], in the axes of each body.
+//! Modes are the business of `flexible`, in the axes of each body.
 //!
 //! What is cheaper to compute again than to fetch (the arm from the parent, the velocity terms) is not stored, so that long chains stay
 //! in the caches. Bodies that are alike share their constants. A child that follows its parent in the order, as in every chain, finds the
