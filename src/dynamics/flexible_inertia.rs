@@ -19,6 +19,7 @@
 use crate::model::flexible_body::{InertiaOrder, ModalIntegrals, TENSOR};
 use crate::model::mode_products::ProductSums;
 use crate::spatial::SpatialInertia;
+use crate::spatial::lanes::{Kernel, Lanes, Processor};
 use crate::spatial::shift::{linear, spatial};
 use nalgebra::{Matrix3, Vector3, Vector6};
 
@@ -37,6 +38,7 @@ pub struct FlexibleInertia {
     W: Vec<f64>,
     /// What the n^2 integrals make of the modal coordinates and rates.
     sums: ProductSums,
+    processor: Processor,
 }
 
 impl FlexibleInertia {
@@ -50,15 +52,21 @@ impl FlexibleInertia {
             row: vec![Vector6::zeros(); n],
             W: vec![0.0; TENSOR * n],
             sums: ProductSums::new(n),
+            processor: Processor::detect(),
         }
     }
 
     /// Evaluates the inertia at the modal coordinates `eta`, and what [`Self::velocity_terms`] needs of the rates `eta_dot`.
     pub fn evaluate(&mut self, integrals: &ModalIntegrals, order: InertiaOrder, eta: &[f64], eta_dot: &[f64]) {
+        self.processor.run(Evaluate { inertia: self, integrals, order, eta, eta_dot });
+    }
+
+    #[inline(always)]
+    fn evaluate_with<L: Lanes>(&mut self, s: L, integrals: &ModalIntegrals, order: InertiaOrder, eta: &[f64], eta_dot: &[f64]) {
         let n = integrals.mode_count();
         self.W.copy_from_slice(&integrals.shape_position);
         if order >= InertiaOrder::First {
-            self.sums.multiply(&integrals.products, eta, eta_dot);
+            self.sums.multiply(s, &integrals.products, eta, eta_dot);
             integrals.products.add_shapes(&self.sums, n, &mut self.W);
         }
         let mut first_moment = integrals.first_moment;
@@ -108,6 +116,18 @@ impl FlexibleInertia {
         eta_dot: &[f64],
         b_modal: &mut [f64],
     ) -> Vector6<f64> {
+        self.processor.run(VelocityTerms { inertia: self, integrals, order, omega, eta_dot, b_modal })
+    }
+
+    #[inline(always)]
+    fn velocity_terms_here(
+        &self,
+        integrals: &ModalIntegrals,
+        order: InertiaOrder,
+        omega: &Vector3<f64>,
+        eta_dot: &[f64],
+        b_modal: &mut [f64],
+    ) -> Vector6<f64> {
         let n = integrals.mode_count();
         // D_ab = int rho u_dot_a x_b
         let D = contract(&self.W, eta_dot);
@@ -121,7 +141,7 @@ impl FlexibleInertia {
             for b in 0..3 {
                 let factor = omega[a] * omega[b] - if a == b { square } else { 0.0 };
                 let plane = &self.W[(3 * a + b) * n..][..n];
-                b_modal.iter_mut().zip(plane).for_each(|(o, w)| *o += factor * w);
+                add_scaled(factor, plane, b_modal);
             }
         }
         if order >= InertiaOrder::First {
@@ -138,7 +158,59 @@ impl FlexibleInertia {
     }
 }
 
+/// [`FlexibleInertia::evaluate`] in the instructions of the processor.
+struct Evaluate<'a> {
+    inertia: &'a mut FlexibleInertia,
+    integrals: &'a ModalIntegrals,
+    order: InertiaOrder,
+    eta: &'a [f64],
+    eta_dot: &'a [f64],
+}
+
+impl Kernel for Evaluate<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self, lanes: L) {
+        self.inertia.evaluate_with(lanes, self.integrals, self.order, self.eta, self.eta_dot);
+    }
+}
+
+/// [`FlexibleInertia::velocity_terms`] in the instructions of the processor.
+struct VelocityTerms<'a> {
+    inertia: &'a FlexibleInertia,
+    integrals: &'a ModalIntegrals,
+    order: InertiaOrder,
+    omega: &'a Vector3<f64>,
+    eta_dot: &'a [f64],
+    b_modal: &'a mut [f64],
+}
+
+impl Kernel for VelocityTerms<'_> {
+    type Output = Vector6<f64>;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self, _: L) -> Vector6<f64> {
+        self.inertia.velocity_terms_here(self.integrals, self.order, self.omega, self.eta_dot, self.b_modal)
+    }
+}
+
+/// `out += factor x`.
+#[inline(always)]
+fn add_scaled(factor: f64, x: &[f64], out: &mut [f64]) {
+    let ((x, x_rest), (out, out_rest)) = (x.as_chunks::<4>(), out.as_chunks_mut::<4>());
+    for (out, x) in out.iter_mut().zip(x) {
+        for i in 0..4 {
+            out[i] += factor * x[i];
+        }
+    }
+    for (out, x) in out_rest.iter_mut().zip(x_rest) {
+        *out += factor * x;
+    }
+}
+
 /// `a . b` by four sums that do not wait for each other.
+#[inline(always)]
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<4>(), b.as_chunks::<4>());
     let mut sums = [0.0; 4];
@@ -152,6 +224,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 }
 
 /// The nine `planes . x`, n numbers each, by tensor component.
+#[inline(always)]
 fn contract(planes: &[f64], x: &[f64]) -> Matrix3<f64> {
     let n = x.len();
     let mut out = Matrix3::zeros();

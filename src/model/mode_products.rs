@@ -5,7 +5,7 @@
 //! `int rho (phi_k x phi_j)_c`. Of each, tiles of 4 x 4 modes on and above the diagonal are kept: a pass over them is bound by what the
 //! caches deliver, and reads half. Source: DESIGN 3.1 (integrals), 3.3 (cost).
 
-use crate::spatial::lanes::{Kernel, Lanes, Processor};
+use crate::spatial::lanes::Lanes;
 
 /// Four columns (modes k) of four rows (modes j).
 type Tile = [[f64; 4]; 4];
@@ -30,7 +30,6 @@ pub struct ModeProducts {
 /// Products with the modal coordinates and rates, four modes at a time.
 #[derive(Debug, Clone)]
 pub struct ProductSums {
-    processor: Processor,
     eta: Vec<[f64; 4]>,
     rate: Vec<[f64; 4]>,
     /// The symmetric planes, then the antisymmetric ones, times eta; then the antisymmetric ones times the rates.
@@ -87,7 +86,29 @@ impl ModeProducts {
         self.tiles[first][j % 4][j % 4]
     }
 
+    /// One pass over all tiles.
+    #[inline(always)]
+    fn multiply<L: Lanes>(&self, s: L, eta: &[[f64; 4]], rate: &[[f64; 4]], sums: &mut [[f64; 4]]) {
+        let (blocks, symmetric) = (self.blocks, self.symmetric);
+        let mut tiles = self.tiles.as_slice();
+        let (with_eta, with_rate) = sums.split_at_mut((symmetric + CROSS) * blocks);
+        for column in 0..blocks {
+            for plane in with_eta.chunks_exact_mut(blocks).take(symmetric) {
+                let (now, rest) = tiles.split_at(column + 1);
+                tiles = rest;
+                multiply_tiles(s, now, eta, 1.0, plane);
+            }
+            for c in 0..CROSS {
+                let (now, rest) = tiles.split_at(column + 1);
+                tiles = rest;
+                multiply_tiles(s, now, eta, -1.0, &mut with_eta[(symmetric + c) * blocks..(symmetric + c + 1) * blocks]);
+                multiply_tiles(s, now, rate, -1.0, &mut with_rate[c * blocks..(c + 1) * blocks]);
+            }
+        }
+    }
+
     /// `out += sum_k P_ab,jk eta_k` for all nine components, n numbers each.
+    #[inline(always)]
     pub fn add_shapes(&self, sums: &ProductSums, n: usize, out: &mut [f64]) {
         if n == 0 {
             return;
@@ -107,6 +128,7 @@ impl ModeProducts {
     }
 
     /// `out_j += factors_c sum_k int rho (phi_k x phi_j)_c rate_k`.
+    #[inline(always)]
     pub fn add_coriolis(&self, sums: &ProductSums, factors: [f64; CROSS], out: &mut [f64]) {
         for (c, factor) in factors.into_iter().enumerate() {
             let cross = sums.plane(self.blocks, self.symmetric + CROSS + c);
@@ -121,15 +143,16 @@ impl ProductSums {
     pub fn new(n: usize) -> Self {
         let blocks = n.div_ceil(4);
         let zero = vec![[0.0; 4]; blocks];
-        Self { processor: Processor::detect(), eta: zero.clone(), rate: zero, sums: vec![[0.0; 4]; (9 + 2 * CROSS) * blocks] }
+        Self { eta: zero.clone(), rate: zero, sums: vec![[0.0; 4]; (9 + 2 * CROSS) * blocks] }
     }
 
     /// Multiplies everything: one pass over `products`.
-    pub fn multiply(&mut self, products: &ModeProducts, eta: &[f64], rate: &[f64]) {
+    #[inline(always)]
+    pub fn multiply<L: Lanes>(&mut self, lanes: L, products: &ModeProducts, eta: &[f64], rate: &[f64]) {
         for (to, from) in [(&mut self.eta, eta), (&mut self.rate, rate)] {
             to.iter_mut().zip(from.chunks(4)).for_each(|(to, from)| to[..from.len()].copy_from_slice(from));
         }
-        self.processor.run(Multiply { products, eta: &self.eta, rate: &self.rate, sums: &mut self.sums });
+        products.multiply(lanes, &self.eta, &self.rate, &mut self.sums);
     }
 
     /// What the pass left of one plane, four modes at a time.
@@ -139,6 +162,7 @@ impl ProductSums {
 }
 
 /// `out += factor x`, one number per mode.
+#[inline(always)]
 fn add_scaled(factor: f64, x: &[[f64; 4]], out: &mut [f64]) {
     let (whole, rest) = out.as_chunks_mut::<4>();
     for (out, x) in whole.iter_mut().zip(x) {
@@ -148,38 +172,6 @@ fn add_scaled(factor: f64, x: &[[f64; 4]], out: &mut [f64]) {
     }
     if let Some(x) = x.last() {
         rest.iter_mut().zip(x).for_each(|(o, x)| *o += factor * x);
-    }
-}
-
-struct Multiply<'a> {
-    products: &'a ModeProducts,
-    eta: &'a [[f64; 4]],
-    rate: &'a [[f64; 4]],
-    sums: &'a mut [[f64; 4]],
-}
-
-impl Kernel for Multiply<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<L: Lanes>(self, s: L) {
-        let Self { products, eta, rate, sums } = self;
-        let (blocks, symmetric) = (products.blocks, products.symmetric);
-        let mut tiles = products.tiles.as_slice();
-        let (with_eta, with_rate) = sums.split_at_mut((symmetric + CROSS) * blocks);
-        for column in 0..blocks {
-            for plane in with_eta.chunks_exact_mut(blocks).take(symmetric) {
-                let (now, rest) = tiles.split_at(column + 1);
-                tiles = rest;
-                multiply_tiles(s, now, eta, 1.0, plane);
-            }
-            for c in 0..CROSS {
-                let (now, rest) = tiles.split_at(column + 1);
-                tiles = rest;
-                multiply_tiles(s, now, eta, -1.0, &mut with_eta[(symmetric + c) * blocks..(symmetric + c + 1) * blocks]);
-                multiply_tiles(s, now, rate, -1.0, &mut with_rate[c * blocks..(c + 1) * blocks]);
-            }
-        }
     }
 }
 
@@ -210,6 +202,23 @@ fn multiply_tiles<L: Lanes>(s: L, tiles: &[Tile], x: &[[f64; 4]], sign: f64, out
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::spatial::lanes::{Kernel, Processor};
+
+    struct Multiply<'a> {
+        sums: &'a mut ProductSums,
+        products: &'a ModeProducts,
+        eta: &'a [f64],
+        rate: &'a [f64],
+    }
+
+    impl Kernel for Multiply<'_> {
+        type Output = ();
+
+        #[inline(always)]
+        fn run<L: Lanes>(self, lanes: L) {
+            self.sums.multiply(lanes, self.products, self.eta, self.rate);
+        }
+    }
 
     #[test]
     fn packed_products_are_those_of_the_whole_planes() {
@@ -246,8 +255,8 @@ mod tests {
                 let products = ModeProducts::new(n, &planes, &cross, skewed);
                 assert_eq!(products.symmetric, if skewed { 9 } else { 6 });
                 for processor in [Processor::plain(), Processor::detect()] {
-                    let mut sums = ProductSums { processor, ..ProductSums::new(n) };
-                    sums.multiply(&products, &eta, &rate);
+                    let mut sums = ProductSums::new(n);
+                    processor.run(Multiply { sums: &mut sums, products: &products, eta: &eta, rate: &rate });
                     let (mut shapes, mut coriolis) = (vec![0.0; 9 * n], vec![0.0; n]);
                     products.add_shapes(&sums, n, &mut shapes);
                     products.add_coriolis(&sums, [0.3, -0.7, 1.1], &mut coriolis);

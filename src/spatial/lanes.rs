@@ -27,8 +27,6 @@ pub trait Lanes: Copy {
     fn mul_add(self, a: Self::V, b: Self::V, c: Self::V) -> Self::V;
     /// `c - a b`.
     fn mul_take(self, a: Self::V, b: Self::V, c: Self::V) -> Self::V;
-    /// `a b + c` of single numbers.
-    fn number_mul_add(self, a: f64, b: f64, c: f64) -> f64;
     /// (y, z, x).
     fn yzx(self, a: Self::V) -> Self::V;
     /// (z, x, y).
@@ -172,11 +170,6 @@ impl Lanes for Plain {
     }
 
     #[inline(always)]
-    fn number_mul_add(self, a: f64, b: f64, c: f64) -> f64 {
-        product_sum(a, b, c)
-    }
-
-    #[inline(always)]
     fn yzx(self, a: [f64; 4]) -> [f64; 4] {
         [a[1], a[2], a[0], a[3]]
     }
@@ -213,95 +206,95 @@ pub use pulp::x86::V3 as Wide;
 
 #[cfg(target_arch = "x86_64")]
 impl Lanes for Wide {
-    type V = pulp::f64x4;
+    type V = core::arch::x86_64::__m256d;
 
     #[inline(always)]
-    fn load(self, x: [f64; 4]) -> pulp::f64x4 {
+    fn load(self, x: [f64; 4]) -> Self::V {
         pulp::cast(x)
     }
 
     #[inline(always)]
-    fn store(self, a: pulp::f64x4) -> [f64; 4] {
+    fn store(self, a: Self::V) -> [f64; 4] {
         pulp::cast(a)
     }
 
     #[inline(always)]
-    fn splat(self, x: f64) -> pulp::f64x4 {
-        self.splat_f64x4(x)
+    fn splat(self, x: f64) -> Self::V {
+        self.avx._mm256_set1_pd(x)
     }
 
     #[inline(always)]
-    fn add(self, a: pulp::f64x4, b: pulp::f64x4) -> pulp::f64x4 {
-        self.add_f64x4(a, b)
+    fn add(self, a: Self::V, b: Self::V) -> Self::V {
+        self.avx._mm256_add_pd(a, b)
     }
 
     #[inline(always)]
-    fn sub(self, a: pulp::f64x4, b: pulp::f64x4) -> pulp::f64x4 {
-        self.sub_f64x4(a, b)
+    fn sub(self, a: Self::V, b: Self::V) -> Self::V {
+        self.avx._mm256_sub_pd(a, b)
     }
 
     #[inline(always)]
-    fn mul(self, a: pulp::f64x4, b: pulp::f64x4) -> pulp::f64x4 {
-        self.mul_f64x4(a, b)
+    fn mul(self, a: Self::V, b: Self::V) -> Self::V {
+        self.avx._mm256_mul_pd(a, b)
     }
 
     #[inline(always)]
-    fn mul_add(self, a: pulp::f64x4, b: pulp::f64x4, c: pulp::f64x4) -> pulp::f64x4 {
-        self.mul_add_f64x4(a, b, c)
+    fn mul_add(self, a: Self::V, b: Self::V, c: Self::V) -> Self::V {
+        self.fma._mm256_fmadd_pd(a, b, c)
     }
 
     #[inline(always)]
-    fn mul_take(self, a: pulp::f64x4, b: pulp::f64x4, c: pulp::f64x4) -> pulp::f64x4 {
-        self.negate_mul_add_f64x4(a, b, c)
+    fn mul_take(self, a: Self::V, b: Self::V, c: Self::V) -> Self::V {
+        self.fma._mm256_fnmadd_pd(a, b, c)
     }
 
     #[inline(always)]
-    fn number_mul_add(self, a: f64, b: f64, c: f64) -> f64 {
-        let [sum, ..] = self.store(self.mul_add(self.splat(a), self.splat(b), self.splat(c)));
-        sum
+    fn yzx(self, a: Self::V) -> Self::V {
+        self.avx2._mm256_permute4x64_pd::<0b11_00_10_01>(a)
     }
 
     #[inline(always)]
-    fn yzx(self, a: pulp::f64x4) -> pulp::f64x4 {
-        pulp::cast(self.avx2._mm256_permute4x64_pd::<0b11_00_10_01>(pulp::cast(a)))
+    fn zxy(self, a: Self::V) -> Self::V {
+        self.avx2._mm256_permute4x64_pd::<0b11_01_00_10>(a)
     }
 
     #[inline(always)]
-    fn zxy(self, a: pulp::f64x4) -> pulp::f64x4 {
-        pulp::cast(self.avx2._mm256_permute4x64_pd::<0b11_01_00_10>(pulp::cast(a)))
+    fn all_x(self, a: Self::V) -> Self::V {
+        self.avx2._mm256_permute4x64_pd::<0b00_00_00_00>(a)
     }
 
     #[inline(always)]
-    fn all_x(self, a: pulp::f64x4) -> pulp::f64x4 {
-        pulp::cast(self.avx2._mm256_permute4x64_pd::<0b00_00_00_00>(pulp::cast(a)))
+    fn all_y(self, a: Self::V) -> Self::V {
+        self.avx2._mm256_permute4x64_pd::<0b01_01_01_01>(a)
     }
 
     #[inline(always)]
-    fn all_y(self, a: pulp::f64x4) -> pulp::f64x4 {
-        pulp::cast(self.avx2._mm256_permute4x64_pd::<0b01_01_01_01>(pulp::cast(a)))
+    fn all_z(self, a: Self::V) -> Self::V {
+        self.avx2._mm256_permute4x64_pd::<0b10_10_10_10>(a)
     }
 
     #[inline(always)]
-    fn all_z(self, a: pulp::f64x4) -> pulp::f64x4 {
-        pulp::cast(self.avx2._mm256_permute4x64_pd::<0b10_10_10_10>(pulp::cast(a)))
+    fn sums_of_four(self, [a, b, c, d]: [Self::V; 4]) -> Self::V {
+        let (first, second) = (self.avx._mm256_hadd_pd(a, b), self.avx._mm256_hadd_pd(c, d));
+        let low = self.avx._mm256_permute2f128_pd::<0x20>(first, second);
+        let high = self.avx._mm256_permute2f128_pd::<0x31>(first, second);
+        self.add(low, high)
     }
 
     #[inline(always)]
-    fn sums(self, [a, b, c]: [pulp::f64x4; 3]) -> pulp::f64x4 {
+    fn sums(self, [a, b, c]: [Self::V; 3]) -> Self::V {
         // (ax, bx, az, bz) and (ay, by, .., ..), then the halves that hold c
-        let (low, high) =
-            (self.avx._mm256_unpacklo_pd(pulp::cast(a), pulp::cast(b)), self.avx._mm256_unpackhi_pd(pulp::cast(a), pulp::cast(b)));
-        let (c_low, c_high): (core::arch::x86_64::__m256d, core::arch::x86_64::__m256d) =
-            (pulp::cast(c), pulp::cast(self.avx._mm256_permute_pd::<0b0101>(pulp::cast(c))));
-        let x = self.avx._mm256_permute2f128_pd::<0x20>(low, c_low);
+        let (low, high) = (self.avx._mm256_unpacklo_pd(a, b), self.avx._mm256_unpackhi_pd(a, b));
+        let c_high = self.avx._mm256_permute_pd::<0b0101>(c);
+        let x = self.avx._mm256_permute2f128_pd::<0x20>(low, c);
         let y = self.avx._mm256_permute2f128_pd::<0x20>(high, c_high);
-        let z = self.avx._mm256_permute2f128_pd::<0x31>(low, c_low);
-        self.add(self.add(pulp::cast(x), pulp::cast(y)), pulp::cast(z))
+        let z = self.avx._mm256_permute2f128_pd::<0x31>(low, c);
+        self.add(self.add(x, y), z)
     }
 
     #[inline(always)]
-    fn last_three(self, x: [f64; 4]) -> pulp::f64x4 {
-        pulp::cast(self.avx2._mm256_permute4x64_pd::<0b11_11_10_01>(pulp::cast(x)))
+    fn last_three(self, x: [f64; 4]) -> Self::V {
+        self.avx2._mm256_permute4x64_pd::<0b11_11_10_01>(pulp::cast(x))
     }
 }
 

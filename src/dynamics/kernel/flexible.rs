@@ -13,8 +13,8 @@
 #![expect(non_snake_case, reason = "symbols follow the table in dynamics/mod.rs")]
 
 use super::inward::Felt;
-use super::modal_shape::{ModalShape, residual_of};
-use super::rows::{Block, block_count, fill, gram, product, spill, sum_of, take_transposed};
+use super::modal_shape::{ModalShape, leave_residual};
+use super::rows::{Block, block_count, fill, gram, product, spill, take_transposed};
 use super::six::{Six, inverse_sum, inverse_sum_of_blocks};
 use super::tip::{Tip, columns_of, rows_of};
 use super::{Doubtful, Motion};
@@ -174,14 +174,13 @@ impl FlexibleLink {
             }
             *r = s.store(felt);
         }
-        let mut D = Matrix3::zeros();
-        let mut momentum = Vector3::zeros();
-        for a in 0..3 {
-            for b in 0..3 {
-                D[(a, b)] = sum_of(s, sums[3 * a + b]);
-            }
-            momentum[a] = sum_of(s, sums[9 + a]);
-        }
+        let sums = [
+            s.store(s.sums_of_four([sums[0], sums[1], sums[2], sums[3]])),
+            s.store(s.sums_of_four([sums[4], sums[5], sums[6], sums[7]])),
+            s.store(s.sums_of_four([sums[8], sums[9], sums[10], sums[11]])),
+        ];
+        let D = Matrix3::from_row_slice(&sums.as_flattened()[..9]);
+        let momentum = Vector3::from_column_slice(&sums.as_flattened()[9..]);
         let first_moment = shape.rigid.first_moment();
         let moment = w.cross(&(shape.rigid.rotational * w)) + (w * D.trace() - D * w) * 2.0;
         let force = w.cross(&w.cross(&first_moment)) + w.cross(&momentum) * 2.0;
@@ -240,13 +239,13 @@ impl FlexibleLink {
             let (S, felt) = tip.gather(s, &self.rotation);
             z = [s.add(s.add(z[0], felt[0]), s.cross(s.of_three(tip.position.into()), felt[1])), s.add(z[1], felt[1])];
             take_transposed(s, rows, tip.turn_back(s, felt), &mut self.r);
-            *inertia = tip.turn_inertia(s, &S);
+            tip.turn_inertia(s, &S, inertia);
         }
         let (rows, residual) = match &mut self.deformed {
             None => (&shape.rows, &shape.residual),
             Some(now) => {
                 now.gather_rows();
-                now.residual = residual_of(s, &now.inertia.rigid, &now.rows);
+                leave_residual(s, &now.inertia.rigid, &now.rows, &mut now.residual);
                 (&now.rows, &now.residual)
             }
         };
@@ -254,14 +253,21 @@ impl FlexibleLink {
         for (c, (tip, phi)) in self.tips.iter_mut().zip(&shape.interfaces).enumerate() {
             let e = product(s, phi, &self.r);
             tip.e = [s.store(e[0]), s.store(e[1])];
-            tip.coupling = if constant { shape.coupling[c] } else { gram(s, rows, phi) };
-            if !tip.reach(s) {
+            let reached = if constant {
+                tip.reach(s, &shape.coupling[c])
+            } else {
+                let mut coupling = Six::ZERO;
+                gram(s, rows, phi, &mut coupling);
+                tip.coupling = coupling;
+                tip.reach(s, &coupling)
+            };
+            if !reached {
                 return Err(Doubtful);
             }
         }
         match self.tips.len() {
             0 => {}
-            1 => self.N[0] = inverse_sum(s, &self.inertia[0], &shape.flexibility[0]).ok_or(Doubtful)?,
+            1 => inverse_sum(s, &self.inertia[0], &shape.flexibility[0], &mut self.N[0]).ok_or(Doubtful)?,
             tips => inverse_sum_of_blocks(tips, &self.inertia, &shape.flexibility, &mut self.work, &mut self.N).ok_or(Doubtful)?,
         }
         let mut P = *residual;
@@ -272,7 +278,7 @@ impl FlexibleLink {
                 let reach = left.Z.times(s, &self.N[a * self.tips.len() + b]);
                 let felt = reach.combine(s, [right.e[0][0], right.e[0][1], right.e[0][2], right.e[1][0], right.e[1][1], right.e[1][2]]);
                 z = [s.add(z[0], felt[0]), s.add(z[1], felt[1])];
-                P = reach.times_transposed_plus(s, &right.Z, &P);
+                reach.add_times_transposed(s, &right.Z, &mut P);
             }
         }
         // the bias of B, to inertial axes, and from B to O, which lies at `origin`
@@ -312,8 +318,9 @@ impl FlexibleLink {
             self.y[a] = [s.store(y[0]), s.store(y[1])];
         }
         spill(&self.r, modal);
+        let constant = shape.order == InertiaOrder::Zeroth;
         for (a, tip) in self.tips.iter_mut().enumerate() {
-            let carried = tip.coupling.apply_transposed(s, alpha);
+            let carried = if constant { &shape.coupling[a] } else { &tip.coupling }.apply_transposed(s, alpha);
             let mut moved = [s.sub(s.load(tip.e[0]), carried[0]), s.sub(s.load(tip.e[1]), carried[1])];
             for (b, y) in self.y.iter().enumerate() {
                 let held = shape.flexibility[a * tips + b].combine(s, [y[0][0], y[0][1], y[0][2], y[1][0], y[1][1], y[1][2]]);

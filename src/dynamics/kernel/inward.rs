@@ -284,11 +284,9 @@ fn get<L: Lanes>(s: L, f: &Outboard, at: usize) -> L::V {
 /// Three numbers of a register to memory; what follows them is written later.
 #[inline(always)]
 fn put<L: Lanes>(s: L, a: L::V, out: &mut Outboard, at: usize) {
-    let x = s.store(a);
-    out[at] = x[0];
-    out[at + 1] = x[1];
-    out[at + 2] = x[2];
-    out[at + 3] = x[3];
+    if let Some(place) = out[at..].first_chunk_mut() {
+        *place = s.store(a);
+    }
 }
 
 /// Trace of a block.

@@ -77,14 +77,18 @@ impl ModalShape {
         });
         let interfaces: Vec<Vec<Block<6>>> = children.iter().map(|a| blocks_of(n, |row, j| a.mode_shape[j][row])).collect();
         let pairs = interfaces.iter().flat_map(|a| interfaces.iter().map(move |b| (a, b)));
-        let flexibility = pairs.map(|(a, b)| gram(Plain, a, b)).collect();
+        let flexibility = pairs.map(|(a, b)| product_of(a, b)).collect();
         let inertia = Matrix3::from_diagonal_element(of.second_moment.trace()) - of.second_moment;
         let rigid = SpatialInertia::rigid(of.mass, &of.first_moment, &((inertia + inertia.transpose()) * 0.5));
         Self {
             modes: n,
             order: body.order,
-            coupling: interfaces.iter().map(|phi| gram(Plain, &rows, phi)).collect(),
-            residual: residual_of(Plain, &rigid, &rows),
+            coupling: interfaces.iter().map(|phi| product_of(&rows, phi)).collect(),
+            residual: {
+                let mut residual = Six::ZERO;
+                leave_residual(Plain, &rigid, &rows, &mut residual);
+                residual
+            },
             rigid,
             integrals,
             rows,
@@ -102,12 +106,24 @@ impl ModalShape {
     }
 }
 
-/// `M_rr - M_fr' M_fr`.
-#[inline(always)]
-pub fn residual_of<L: Lanes>(s: L, rigid: &SpatialInertia, rows: &[Block<6>]) -> Six {
-    let (mut out, carried) = (Six::from(rigid.matrix()), gram(s, rows, rows));
-    for (column, carried) in out.0.iter_mut().zip(&carried.0) {
-        column.iter_mut().zip(carried).for_each(|(x, c)| *x -= c);
-    }
+/// `a b'` of two sets of rows.
+fn product_of(a: &[Block<6>], b: &[Block<6>]) -> Six {
+    let mut out = Six::ZERO;
+    gram(Plain, a, b, &mut out);
     out
+}
+
+/// Leaves `M_rr - M_fr' M_fr`.
+#[inline(always)]
+pub fn leave_residual<L: Lanes>(s: L, rigid: &SpatialInertia, rows: &[Block<6>], out: &mut Six) {
+    gram(s, rows, rows, out);
+    for j in 0..3 {
+        let [top, bottom] = out.column(s, j);
+        let (r, c) = (&rigid.rotational, &rigid.coupling);
+        let own = [s.of_three([r[(0, j)], r[(1, j)], r[(2, j)]]), s.of_three([c[(j, 0)], c[(j, 1)], c[(j, 2)]])];
+        out.put(s, j, [s.sub(own[0], top), s.sub(own[1], bottom)]);
+        let ([top, bottom], t) = (out.column(s, j + 3), &rigid.translational);
+        let own = [s.of_three([c[(0, j)], c[(1, j)], c[(2, j)]]), s.of_three([t[(0, j)], t[(1, j)], t[(2, j)]])];
+        out.put(s, j + 3, [s.sub(own[0], top), s.sub(own[1], bottom)]);
+    }
 }

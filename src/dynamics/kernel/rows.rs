@@ -38,18 +38,10 @@ pub fn spill(from: &[[f64; 4]], to: &mut [f64]) {
     }
 }
 
-/// Sum of all four numbers.
-#[inline(always)]
-pub fn sum_of<L: Lanes>(s: L, a: L::V) -> f64 {
-    let [a, b, c, d] = s.store(a);
-    (a + b) + (c + d)
-}
-
 /// Six sums over all modes as a spatial vector.
 #[inline(always)]
 fn gathered<L: Lanes>(s: L, a: [L::V; 6]) -> Pair<L::V> {
-    let x = [sum_of(s, a[0]), sum_of(s, a[1]), sum_of(s, a[2]), sum_of(s, a[3]), sum_of(s, a[4]), sum_of(s, a[5])];
-    [s.of_three([x[0], x[1], x[2]]), s.of_three([x[3], x[4], x[5]])]
+    [s.sums_of_four([a[0], a[1], a[2], a[2]]), s.sums_of_four([a[3], a[4], a[5], a[5]])]
 }
 
 /// `rows x` and `rows y`.
@@ -95,22 +87,18 @@ pub fn take_transposed<L: Lanes>(s: L, rows: &[Block<6>], f: Pair<L::V>, x: &mut
 
 /// `a b'` of two sets of rows.
 #[inline(always)]
-pub fn gram<L: Lanes>(s: L, a: &[Block<6>], b: &[Block<6>]) -> Six {
-    let mut out = Six::ZERO;
-    for i in [0, 2, 4] {
+pub fn gram<L: Lanes>(s: L, a: &[Block<6>], b: &[Block<6>], out: &mut Six) {
+    for j in [0, 2, 4] {
         let (mut first, mut second) = ([s.splat(0.0); 6], [s.splat(0.0); 6]);
         for (a, b) in a.iter().zip(b) {
-            let (x, y) = (s.load(a[i]), s.load(a[i + 1]));
+            let (x, y) = (s.load(b[j]), s.load(b[j + 1]));
             for r in 0..6 {
-                let row = s.load(b[r]);
+                let row = s.load(a[r]);
                 first[r] = s.mul_add(row, x, first[r]);
                 second[r] = s.mul_add(row, y, second[r]);
             }
         }
-        for r in 0..6 {
-            out.set(i, r, sum_of(s, first[r]));
-            out.set(i + 1, r, sum_of(s, second[r]));
-        }
+        out.put(s, j, gathered(s, first));
+        out.put(s, j + 1, gathered(s, second));
     }
-    out
 }

@@ -1,7 +1,6 @@
 //! 6 x 6 algebra in registers, beside the modes.
 
 use crate::spatial::lanes::Lanes;
-use nalgebra::Matrix6;
 
 /// A spatial vector: angular, linear.
 pub type Pair<V> = [V; 2];
@@ -52,17 +51,15 @@ impl Six {
         out
     }
 
-    /// `A b' + c`.
+    /// `out + A b'` into `out`.
     #[inline(always)]
-    pub fn times_transposed_plus<L: Lanes>(&self, s: L, b: &Self, c: &Self) -> Self {
-        let mut out = Self::ZERO;
+    pub fn add_times_transposed<L: Lanes>(&self, s: L, b: &Self, out: &mut Self) {
         for j in 0..6 {
             let p = PLACE[j];
             let [top, bottom] = self.combine(s, [b.0[0][p], b.0[1][p], b.0[2][p], b.0[3][p], b.0[4][p], b.0[5][p]]);
-            let [upper, lower] = c.column(s, j);
+            let [upper, lower] = out.column(s, j);
             out.put(s, j, [s.add(top, upper), s.add(bottom, lower)]);
         }
-        out
     }
 
     /// `A x` of numbers in memory.
@@ -100,22 +97,10 @@ fn dot<L: Lanes>(s: L, a: Pair<L::V>, b: Pair<L::V>) -> L::V {
     s.mul_add(a[1], b[1], s.mul(a[0], b[0]))
 }
 
-impl From<Matrix6<f64>> for Six {
-    fn from(m: Matrix6<f64>) -> Self {
-        let mut out = Self::ZERO;
-        for i in 0..6 {
-            for j in 0..6 {
-                out.set(i, j, m[(i, j)]);
-            }
-        }
-        out
-    }
-}
-
 /// `(1 + S G)^-1 S` of symmetric positive semidefinite `S` and `G`, which needs the inverse of neither, so that neither a singular nor a
 /// very large inertia costs digits. Gauss elimination with row exchanges; none where the sum is singular, which semidefinite matrices exclude.
 #[inline(always)]
-pub fn inverse_sum<L: Lanes>(s: L, inertia: &Six, flexibility: &Six) -> Option<Six> {
+pub fn inverse_sum<L: Lanes>(s: L, inertia: &Six, flexibility: &Six, out: &mut Six) -> Option<()> {
     // rows (1 + S G | S) of twelve numbers; S and G are symmetric, so that their columns are their rows
     let mut rows = [[0.0; 12]; 6];
     for i in 0..6 {
@@ -154,13 +139,12 @@ pub fn inverse_sum<L: Lanes>(s: L, inertia: &Six, flexibility: &Six) -> Option<S
             take(s, row, other[k], other);
         }
     }
-    let mut out = Six::ZERO;
     for i in 0..6 {
         for j in 0..6 {
             out.set(i, j, 0.5 * (rows[i][6 + j] + rows[j][6 + i]));
         }
     }
-    Some(out)
+    Some(())
 }
 
 #[inline(always)]

@@ -27,7 +27,7 @@ pub struct Tip {
     pub e: [[f64; 4]; 2],
     /// `Z`.
     pub Z: Six,
-    /// `F' Phi'`.
+    /// `F' Phi'` at the present deformation, for inertia of order 1 and 2.
     pub coupling: Six,
     /// O+ in B (m).
     pub position: Vector3<f64>,
@@ -134,19 +134,18 @@ impl Tip {
 
     /// `T' S T`.
     #[inline(always)]
-    pub fn turn_inertia<L: Lanes>(&self, s: L, S: &Six) -> Six {
-        let (turn, lift, mut out) = (&self.turn, &self.lift, Six::ZERO);
+    pub fn turn_inertia<L: Lanes>(&self, s: L, S: &Six, out: &mut Six) {
+        let (turn, lift) = (&self.turn, &self.lift);
         for j in 0..3 {
             let moved = S.combine(s, [turn[(0, j)], turn[(1, j)], turn[(2, j)], lift[(0, j)], lift[(1, j)], lift[(2, j)]]);
             out.put(s, j, self.turn_back(s, moved));
             out.put(s, j + 3, self.turn_back(s, S.column(s, j + 3)));
         }
-        out
     }
 
-    /// Leaves `Z = X - F' Phi'`, `X = (T^-1 phi*)'`; false where the interface's rotation vector is singular.
+    /// Leaves `Z = X - F' Phi'` (`coupling`), `X = (T^-1 phi*)'`; false where the interface's rotation vector is singular.
     #[inline(always)]
-    pub fn reach<L: Lanes>(&mut self, s: L) -> bool {
+    pub fn reach<L: Lanes>(&mut self, s: L, coupling: &Six) -> bool {
         let t = &self.turn;
         let column = |j: usize| Vector3::new(t[(0, j)], t[(1, j)], t[(2, j)]);
         let (a, b, c) = (column(0), column(1), column(2));
@@ -163,7 +162,7 @@ impl Tip {
             [p.y, -p.x, 0.0, 0.0, 0.0, 1.0],
         ];
         for j in 0..6 {
-            let (x, [top, bottom]) = (columns[j], self.coupling.column(s, j));
+            let (x, [top, bottom]) = (columns[j], coupling.column(s, j));
             let own = [s.of_three([x[0], x[1], x[2]]), s.of_three([x[3], x[4], x[5]])];
             self.Z.put(s, j, [s.sub(own[0], top), s.sub(own[1], bottom)]);
         }
