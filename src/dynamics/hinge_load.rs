@@ -25,6 +25,9 @@ pub fn hinge_load_on_parent(workspace: &Workspace, k: usize) -> Vector6<f64> {
 
 /// Loads at all hinges, one per body; `out` has one entry per body.
 pub fn hinge_loads(system: &System, workspace: &Workspace, out: &mut [Vector6<f64>]) {
+    if let Some(tree) = workspace.kernel().filter(|tree| tree.holds_loads()) {
+        return tree.copy_loads(out);
+    }
     for (k, load) in out.iter_mut().enumerate().take(system.bodies.len()) {
         *load = hinge_load(workspace, k);
     }

@@ -142,6 +142,13 @@ impl TreeKernel {
         self.outboard.get(k).map_or_else(|| Vector6::repeat(f64::NAN), |load| Vector6::from_column_slice(&load[..6]))
     }
 
+    /// All of them, one per body, where there is room for them.
+    pub(super) fn copy_loads(&self, out: &mut [Vector6<f64>]) {
+        for (out, load) in out.iter_mut().zip(&self.outboard) {
+            *out = Vector6::new(load[0], load[1], load[2], load[3], load[4], load[5]);
+        }
+    }
+
     /// Power (W) of motors, dampers, prescribed motions and external loads at the last evaluation, at `state`.
     #[must_use]
     pub fn power(&self, system: &System, state: &State) -> f64 {
