@@ -36,7 +36,7 @@ const RATE: f64 = 60.0;
 /// Tolerance that no step exceeds: error control off.
 const LOOSE: f64 = 1e12;
 
-/// Answers `<panels> <modes> <solver> <h> <T>` until the input ends. A request that has no answer gets an object with `error`.
+/// Answers `<panels> <modes> <solver> <h> <T>` (the solver with `@0` or `@1` for inertia of that order instead of 2) until the input ends. A request that has no answer gets an object with `error`.
 pub fn serve(folder: &Path) -> Result<(), Box<dyn Error>> {
     for line in std::io::stdin().lock().lines() {
         let answer = answer(folder, &line?).unwrap_or_else(|error| json!({ "error": error.to_string() }));
@@ -47,7 +47,7 @@ pub fn serve(folder: &Path) -> Result<(), Box<dyn Error>> {
 }
 
 /// The system of `count` panels.
-fn hub_and_panels(panel: &Panel, count: usize) -> Definition {
+fn hub_and_panels(panel: &Panel, count: usize, order: InertiaOrder) -> Definition {
     let hub = BodyDefinition {
         name: "hub".into(),
         kind: BodyDefinitionKind::Rigid {
@@ -71,7 +71,7 @@ fn hub_and_panels(panel: &Panel, count: usize) -> Definition {
         axes: LoadAxes::World,
     };
     let mut definition = Definition { bodies: vec![hub], hinges: vec![base], loads: vec![torque], ..Definition::default() };
-    panel.append(&mut definition, count, InertiaOrder::Second, "hub", Vector3::new(HUB_HALF, 0.0, 0.0), SPRING);
+    panel.append(&mut definition, count, order, "hub", Vector3::new(HUB_HALF, 0.0, 0.0), SPRING);
     definition
 }
 
@@ -106,7 +106,13 @@ fn answer(folder: &Path, request: &str) -> Result<serde_json::Value, Box<dyn Err
     };
     let (count, modes, h, duration): (usize, usize, f64, f64) = (count.parse()?, modes.parse()?, h.parse()?, duration.parse()?);
     let panel = Panel::of(folder, modes)?;
-    let (system, state) = hub_and_panels(&panel, count).build()?;
+    let (solver, order) = match solver.split_once('@') {
+        None => (solver, InertiaOrder::Second),
+        Some((solver, "0")) => (solver, InertiaOrder::Zeroth),
+        Some((solver, "1")) => (solver, InertiaOrder::First),
+        Some((_, order)) => return Err(format!("inertia order \"{order}\" is not 0 or 1; without one it is 2").into()),
+    };
+    let (system, state) = hub_and_panels(&panel, count, order).build()?;
     let method = method(solver, &system, h).ok_or_else(|| format!("no solver \"{solver}\""))?;
     let settings = Settings { duration, method, rate_hz: RATE };
     let mut forces = Forces(Vec::new());

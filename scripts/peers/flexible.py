@@ -14,7 +14,8 @@ FINE, LESS_FINE = 1e-10, 1e-8
 EXUDYN_STEPS = (4e-3, 2e-3, 1e-3, 5e-4, 2.5e-4, 1.25e-4)
 # solver, h of examples/peer and words for the table
 PLIANT = [("auto", 1e-6, "auto, as scenes have it"), *(("rosenbrock_w", h, f"rosenbrock_w at {h:.0e}") for h in (1e-2, 1e-3, 1e-4, 5e-5, 1e-5)),
-          *(("dormand_prince", h, f"dormand_prince at {h:.0e}") for h in (1e-2, 1e-4)), ("rk4", 4e-4, "rk4 in steps of 4e-4 s")]
+          *(("dormand_prince", h, f"dormand_prince at {h:.0e}") for h in (1e-2, 1e-4)), ("rk4", 4e-4, "rk4 in steps of 4e-4 s"),
+          ("rosenbrock_w@0", 5e-5, "rosenbrock_w at 5e-05, inertia order 0"), ("rk4@0", 4e-4, "rk4 in steps of 4e-4 s, inertia order 0")]
 MODES = (6, 12, 24, 48, 96)
 CHAIN = 8
 ORDERS = (0, 1, 2)

@@ -191,7 +191,7 @@ impl GeneralHinge {
     }
 }
 
-/// Velocities of all O in inertial axes (m/s), and those of the frames of flexible bodies.
+/// Velocities of O in inertial axes (m/s) of as many bodies as there is room for, and those of the frames of flexible ones.
 pub fn velocities(
     state: &State,
     layout: &Layout,
@@ -200,7 +200,7 @@ pub fn velocities(
     flexible: &mut [FlexibleLink],
     out: &mut [Vector3<f64>],
 ) {
-    for (k, link) in layout.links.iter().enumerate() {
+    for (k, link) in layout.links.iter().enumerate().take(out.len()) {
         let parent = carrier(link, layout, motion, flexible);
         let omega = parent.map_or_else(Vector3::zeros, |m| Vector3::new(m[9], m[10], m[11]));
         let base = match layout.tips.get(link.tip as usize) {

@@ -77,7 +77,7 @@ pub struct TreeKernel {
     general: Vec<GeneralHinge>,
     flexible: Vec<FlexibleLink>,
     modal_shapes: Vec<ModalShape>,
-    /// Velocity of O in inertial axes, for systems with loads.
+    /// Velocity of O in inertial axes of all bodies up to the last with a load.
     velocity: Vec<Vector3<f64>>,
     /// External force on the loaded bodies at O in inertial axes.
     external: Vec<Vector6<f64>>,
@@ -110,7 +110,7 @@ impl TreeKernel {
             outboard: vec![[0.0; RECORD]; if with_loads { n } else { 0 }],
             branches: vec![Branch { felt: [0.0; RECORD], acceleration: [0.0; 6] }; layout.branches],
             general: layout.general.iter().map(|&body| GeneralHinge::new(body)).collect(),
-            velocity: vec![Vector3::zeros(); if system.loads.is_empty() { 0 } else { n }],
+            velocity: vec![Vector3::zeros(); system.loads.iter().map(|l| l.body + 1).max().unwrap_or(0)],
             external: vec![Vector6::zeros(); layout.loaded.len()],
             flexible,
             modal_shapes,
