@@ -339,10 +339,16 @@ impl FlexibleLink {
     }
 
     /// Power (W) of modal damping and external loads.
-    pub fn power(&self, system: &System, state: &State) -> f64 {
+    pub fn power(&self, system: &System, state: &State, shape: &ModalShape) -> f64 {
         let body = &system.bodies[self.body];
         let rates = &state.modal_velocity[body.modal_range()];
-        let damping = body.flexible().map_or(0.0, |f| f.damping.iter().zip(rates).map(|(c, e)| c * e * e).sum());
+        let mut damped = [0.0; 4];
+        for (c, e) in shape.damping.iter().zip(&self.rate) {
+            for i in 0..4 {
+                damped[i] += c[i] * e[i] * e[i];
+            }
+        }
+        let damping: f64 = damped.iter().sum();
         let modal: f64 = self.external.iter().zip(rates).map(|(f, e)| f * e).sum();
         modal + self.external_force.dot(&spatial(&self.omega, &self.velocity)) - damping
     }

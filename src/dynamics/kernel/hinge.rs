@@ -143,14 +143,7 @@ impl GeneralHinge {
         );
         let felt = Vector6::from(self.applied);
         let felt = spatial(&(self.rotation * angular(&felt)), &(self.rotation * linear(&felt)));
-        let factor = inertia.matrix().cholesky().ok_or(Doubtful)?;
-        let sizes = [inertia.rotational.trace(), inertia.translational.trace()];
-        let pivots = factor.l_dirty().diagonal();
-        let sound = |(i, root): (usize, &f64)| root * root > SINGULAR * sizes[i / 3] && root * root >= f64::MIN_POSITIVE;
-        if !pivots.iter().enumerate().all(sound) {
-            return Err(Doubtful);
-        }
-        let free = factor.solve(&(felt - force));
+        let free = solve_positive(inertia, felt - force).ok_or(Doubtful)?;
         for i in 0..MAX_RATES {
             self.inertia.G[i] = self.map[i];
             self.nu[i] = self.map[i].dot(&free);
@@ -189,6 +182,33 @@ impl GeneralHinge {
         }
         along - body.hinge.spring_force(q).iter().zip(v).map(|(f, v)| f * v).sum::<f64>()
     }
+}
+
+/// `P^-1 x` by `P = L D L'`; none if a pivot is rounding of the size of its half.
+fn solve_positive(inertia: &SpatialInertia, mut x: Vector6<f64>) -> Option<Vector6<f64>> {
+    let mut p = inertia.matrix();
+    let sizes = [inertia.rotational.trace(), inertia.translational.trace()];
+    for k in 0..MAX_RATES {
+        let pivot = p[(k, k)];
+        if !(pivot > SINGULAR * sizes[k / 3] && pivot >= f64::MIN_POSITIVE) {
+            return None;
+        }
+        for i in k + 1..MAX_RATES {
+            let factor = p[(i, k)] / pivot;
+            for j in k + 1..=i {
+                p[(i, j)] -= factor * p[(j, k)];
+            }
+            x[i] -= factor * x[k];
+        }
+    }
+    for k in (0..MAX_RATES).rev() {
+        // column k of L is that of p over its pivot
+        for i in k + 1..MAX_RATES {
+            x[k] -= p[(i, k)] * x[i];
+        }
+        x[k] /= p[(k, k)];
+    }
+    Some(x)
 }
 
 /// Velocities of O in inertial axes (m/s) of as many bodies as there is room for, and those of the frames of flexible ones.

@@ -166,7 +166,7 @@ impl TreeKernel {
             let m = &self.motion[body];
             total += force.dot(&spatial(&Vector3::new(m[9], m[10], m[11]), &self.velocity[body]));
         }
-        total + self.flexible.iter().map(|f| f.power(system, state)).sum::<f64>()
+        total + self.flexible.iter().map(|f| f.power(system, state, &self.modal_shapes[f.shape])).sum::<f64>()
     }
 
     /// Angular velocity and acceleration (angular; linear, less gravity) of frame B of flexible body `k` at the last evaluation, B axes.

@@ -5,7 +5,7 @@ use crate::spatial::lanes::Lanes;
 /// A spatial vector: angular, linear.
 pub type Pair<V> = [V; 2];
 
-/// A 6 x 6 matrix by columns, whose angular and linear halves fill a register each.
+/// A 6 x 6 matrix by columns, whose angular and linear halves fill a register each; the fourth numbers mean nothing.
 #[derive(Debug, Clone, Copy)]
 pub struct Six(pub [[f64; 8]; 6]);
 
@@ -36,7 +36,7 @@ impl Six {
     #[inline(always)]
     pub fn put<L: Lanes>(&mut self, s: L, j: usize, [top, bottom]: Pair<L::V>) {
         let (t, b) = (s.store(top), s.store(bottom));
-        self.0[j] = [t[0], t[1], t[2], 0.0, b[0], b[1], b[2], 0.0];
+        self.0[j] = [t[0], t[1], t[2], t[3], b[0], b[1], b[2], b[3]];
     }
 
     /// `A b`.
