@@ -6,6 +6,14 @@
 //!
 //! The fourth number of a register means nothing: it may hold whatever lay beside a vector in memory.
 
+/// The four numbers of `x` from `at` on, in one piece: assembled one by one they would be loaded one by one.
+#[inline(always)]
+#[must_use]
+pub fn quad<const N: usize>(x: &[f64; N], at: usize) -> [f64; 4] {
+    // callers stay inside; the compiler sees it where N and the place are constants
+    x[at..].first_chunk().copied().unwrap_or([0.0; 4])
+}
+
 /// Four numbers and what is done with the first three.
 pub trait Lanes: Copy {
     /// A register.

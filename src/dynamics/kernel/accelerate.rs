@@ -4,7 +4,7 @@ use super::layout::{Passage, Shape};
 use super::{Branch, Motion, NONE, Outboard, TreeKernel, arm, attitude, parent_motion};
 use crate::dynamics::sweep::force_inward::world_acceleration;
 use crate::model::{State, System};
-use crate::spatial::lanes::Lanes;
+use crate::spatial::lanes::{Lanes, quad};
 use crate::spatial::shift::spatial;
 use nalgebra::Vector3;
 
@@ -30,7 +30,7 @@ pub fn accelerate<L: Lanes>(s: L, tree: &mut TreeKernel, system: &System, state:
         if link.passage != Passage::General {
             let (turn, omega) = parent_motion(s, link, layout, motion, flexible);
             let m = &motion[k];
-            let axis = s.load([m[6], m[7], m[8], m[9]]);
+            let axis = s.load(quad(m, 6));
             let at = arm(s, link, shape, state, turn, omega, axis);
             // alpha+ = phi* alpha of the parent
             linear = s.sub(linear, s.cross(at.l, angular));
@@ -40,7 +40,7 @@ pub fn accelerate<L: Lanes>(s: L, tree: &mut TreeKernel, system: &System, state:
             (angular, linear) = (s.add(angular, at.angular), s.add(linear, at.linear));
             if link.passage != Passage::Fixed {
                 let g = &gains[k];
-                let (gain_angular, gain_linear) = (s.load([g[0], g[1], g[2], g[3]]), s.load([g[3], g[4], g[5], g[6]]));
+                let (gain_angular, gain_linear) = (s.load(quad(g, 0)), s.load(quad(g, 3)));
                 let acceleration = g[6] - s.dot_two(gain_angular, angular, gain_linear, linear);
                 hinge[link.v as usize] = acceleration;
                 if link.passage == Passage::Revolute {
@@ -102,5 +102,5 @@ fn in_axes<L: Lanes>(s: L, axes: [L::V; 3], f: L::V) -> L::V {
 
 #[inline(always)]
 fn column<L: Lanes>(s: L, out: &Outboard, at: usize) -> L::V {
-    s.load([out[at], out[at + 1], out[at + 2], out[at + 3]])
+    s.load(quad(out, at))
 }

@@ -8,7 +8,7 @@ use super::{Arm, Doubtful, Gain, Outboard, RECORD, TreeKernel, angular_velocity,
 use crate::dynamics::sweep::inertia_inward::SINGULAR;
 use crate::model::{State, System};
 use crate::spatial::SpatialInertia;
-use crate::spatial::lanes::Lanes;
+use crate::spatial::lanes::{Lanes, quad};
 use crate::spatial::shift::spatial;
 use nalgebra::{Matrix3, Vector3, Vector6};
 
@@ -278,7 +278,7 @@ impl<V: Copy> Felt<V> {
 /// Three numbers of memory to a register.
 #[inline(always)]
 fn get<L: Lanes>(s: L, f: &Outboard, at: usize) -> L::V {
-    s.load([f[at], f[at + 1], f[at + 2], f[at + 3]])
+    s.load(quad(f, at))
 }
 
 /// Three numbers of a register to memory; what follows them is written later.

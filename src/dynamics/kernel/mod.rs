@@ -32,7 +32,7 @@ mod six;
 mod tip;
 
 use crate::model::{State, System};
-use crate::spatial::lanes::{Kernel, Lanes, Processor};
+use crate::spatial::lanes::{Kernel, Lanes, Processor, quad};
 use crate::spatial::shift::spatial;
 use flexible::FlexibleLink;
 use hinge::GeneralHinge;
@@ -215,13 +215,13 @@ impl Kernel for Evaluation<'_> {
 /// The attitude of one body in registers.
 #[inline(always)]
 fn attitude<L: Lanes>(s: L, m: &Motion) -> [L::V; 3] {
-    [s.load([m[0], m[1], m[2], m[3]]), s.load([m[3], m[4], m[5], m[6]]), s.load([m[6], m[7], m[8], m[9]])]
+    [s.load(quad(m, 0)), s.load(quad(m, 3)), s.load(quad(m, 6))]
 }
 
 /// The angular velocity of one body in a register.
 #[inline(always)]
 fn angular_velocity<L: Lanes>(s: L, m: &Motion) -> L::V {
-    s.last_three([m[8], m[9], m[10], m[11]])
+    s.last_three(quad(m, 8))
 }
 
 /// Attitude of the inertial frame.

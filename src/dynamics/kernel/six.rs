@@ -1,6 +1,6 @@
 //! 6 x 6 algebra in registers, beside the modes.
 
-use crate::spatial::lanes::Lanes;
+use crate::spatial::lanes::{Lanes, quad};
 
 /// A spatial vector: angular, linear.
 pub type Pair<V> = [V; 2];
@@ -30,7 +30,7 @@ impl Six {
     #[inline(always)]
     pub fn column<L: Lanes>(&self, s: L, j: usize) -> Pair<L::V> {
         let c = &self.0[j];
-        [s.load([c[0], c[1], c[2], c[3]]), s.load([c[4], c[5], c[6], c[7]])]
+        [s.load(quad(c, 0)), s.load(quad(c, 4))]
     }
 
     #[inline(always)]
@@ -149,7 +149,7 @@ pub fn inverse_sum<L: Lanes>(s: L, inertia: &Six, flexibility: &Six, out: &mut S
 
 #[inline(always)]
 fn thirds<L: Lanes>(s: L, x: &[f64; 12]) -> [L::V; 3] {
-    [s.load([x[0], x[1], x[2], x[3]]), s.load([x[4], x[5], x[6], x[7]]), s.load([x[8], x[9], x[10], x[11]])]
+    [s.load(quad(x, 0)), s.load(quad(x, 4)), s.load(quad(x, 8))]
 }
 
 #[inline(always)]

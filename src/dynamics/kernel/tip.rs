@@ -5,7 +5,7 @@ use super::rows::{Block, two_products};
 use super::six::{Pair, Six};
 use super::{Motion, Outboard, RECORD};
 use crate::model::Attachment;
-use crate::spatial::lanes::Lanes;
+use crate::spatial::lanes::{Lanes, quad};
 use crate::spatial::rotation::{skew, turning_frame};
 use crate::spatial::shift::spatial;
 use nalgebra::{Matrix3, Vector3, Vector6};
@@ -121,7 +121,7 @@ impl Tip {
         }
         let b = &self.bias;
         let [moment, force] = S.combine(s, [b[0], b[1], b[2], b[3], b[4], b[5]]);
-        let own = [s.combine(back, s.of_three([f[27], f[28], f[29]])), s.combine(back, s.of_three([f[30], f[31], f[32]]))];
+        let own = [s.combine(back, s.load(quad(f, 27))), s.combine(back, s.load(quad(f, 30)))];
         (S, [s.add(own[0], moment), s.add(own[1], force)])
     }
 
@@ -198,11 +198,7 @@ pub fn rows_of<L: Lanes>(s: L, m: &Matrix3<f64>) -> [L::V; 3] {
 /// `R' B R` of the block at `at` of a record; `back` holds the rows of R.
 #[inline(always)]
 fn turned<L: Lanes>(s: L, f: &Outboard, at: usize, r: &Matrix3<f64>, back: [L::V; 3]) -> [L::V; 3] {
-    let block = [
-        s.of_three([f[at], f[at + 1], f[at + 2]]),
-        s.of_three([f[at + 3], f[at + 4], f[at + 5]]),
-        s.of_three([f[at + 6], f[at + 7], f[at + 8]]),
-    ];
+    let block = [s.load(quad(f, at)), s.load(quad(f, at + 3)), s.load(quad(f, at + 6))];
     [
         s.combine(back, s.combine_numbers(block, [r[0], r[1], r[2]])),
         s.combine(back, s.combine_numbers(block, [r[3], r[4], r[5]])),
