@@ -3,6 +3,7 @@
 //! [`OutputPlan`] says what is wanted, [`OutputSet`] is the observer that evaluates each output time once ([`frame`]) and hands it to
 //! the tracker and the writers. Names and units are those of [`channels`]. Nothing here prints.
 
+pub mod background;
 pub mod channels;
 pub mod closure_load;
 pub mod evaluation;

@@ -3,6 +3,7 @@
 //! The order of [`ResultsWriter::write`] is that of [`result_channels`]; a test holds the two together. Rows are handed over in blocks
 //! through a bounded channel: the solver waits if the disk is that slow, and nothing is dropped.
 
+use super::background::stand_back;
 use super::channels::{Channel, result_channels};
 use super::frame::OutputFrame;
 use super::load_pose::{closure_pose, hinge_pose};
@@ -54,6 +55,7 @@ impl ResultsWriter {
         let (sender, receiver) = bounded::<Vec<f64>>(in_flight);
         let (returned, written) = bounded(in_flight + 1);
         let work = move || {
+            stand_back();
             for block in receiver {
                 file.append(&block)?;
                 // the run keeps no room for more blocks than are in use

@@ -4,6 +4,7 @@
 //! for room, at most [`PATIENCE`]; after that the stream is given up, the run goes on and the report says so. Nothing waits without bound: ports are probed before anything connects, and closing
 //! has a time limit.
 
+use super::background::stand_back;
 use super::picture::Snapshot;
 use crossbeam_channel::{Receiver, RecvTimeoutError, SendTimeoutError, Sender, bounded};
 use std::net::{SocketAddr, TcpListener, TcpStream, ToSocketAddrs};
@@ -216,6 +217,7 @@ impl ViewerStream {
         let (sender, receiver) = bounded::<Vec<Message>>((ROOM / (most * snapshot_bytes.max(1))).clamp(4, BATCHES));
         let (finished, done) = bounded(1);
         let work = move || {
+            stand_back();
             let mut frames = 0;
             let result = feed(&receiver, &mut log, &mut frames).and_then(|()| log.close());
             // nobody listens any more if the run gave the stream up

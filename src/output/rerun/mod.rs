@@ -8,6 +8,7 @@
 mod columns;
 mod layout;
 
+use super::background::in_background;
 use super::picture::{BodyPicture, ClosurePicture, ClosureSnapshot, LoadSnapshot, Picture, Snapshot};
 use super::plan::OutputPlan;
 use super::scales::{ColourMap, Scales, line_colour};
@@ -48,26 +49,25 @@ const MEGA: f64 = 1e-6;
 pub fn open(target: &ViewerTarget, plan: &OutputPlan, system: &System, start: &State) -> Result<ViewerStream, ViewerError> {
     const AGAIN: &str = "start the viewer again, or save a recording instead";
     let builder = RecordingStreamBuilder::new(APPLICATION).recording_name(plan.scene_name.as_str());
-    let setup = |e: RecordingStreamError| ViewerError::Setup { cause: e.to_string() };
     let (recording, shown, remedy, end) = match target {
         ViewerTarget::Save(file) => {
             let refused = |e: std::io::Error| ViewerError::Create { file: file.clone(), cause: e.to_string() };
             std::fs::File::create(file).map_err(refused)?;
-            let recording = builder.save(file).map_err(setup)?;
+            let recording = made(|| builder.save(file))?;
             (recording, file.display().to_string(), "look for a full disk", End::File(file.clone()))
         }
         ViewerTarget::Spawn { executable } => {
             let url = spawn(executable.as_deref())?;
-            (builder.connect_grpc_opts(url.as_str()).map_err(setup)?, url, AGAIN, End::Viewer)
+            (made(|| builder.connect_grpc_opts(url.as_str()))?, url, AGAIN, End::Viewer)
         }
         ViewerTarget::Connect { url } => {
             let url = probe(url)?;
-            (builder.connect_grpc_opts(url.as_str()).map_err(setup)?, url, AGAIN, End::Viewer)
+            (made(|| builder.connect_grpc_opts(url.as_str()))?, url, AGAIN, End::Viewer)
         }
         ViewerTarget::Web { port, grpc_port } => {
             free_port(*port)?;
             free_port(*grpc_port)?;
-            let recording = builder.serve_grpc_opts("127.0.0.1", *grpc_port, rerun::ServerOptions::default()).map_err(setup)?;
+            let recording = made(|| builder.serve_grpc_opts("127.0.0.1", *grpc_port, rerun::ServerOptions::default()))?;
             let data = format!("rerun+http://127.0.0.1:{grpc_port}/proxy");
             let config = rerun::web_viewer::WebViewerConfig {
                 bind_ip: "127.0.0.1".into(),
@@ -83,6 +83,12 @@ pub fn open(target: &ViewerTarget, plan: &OutputPlan, system: &System, start: &S
         }
     };
     stream(recording, shown, remedy, end, plan, system, start)
+}
+
+/// What `work` makes, with the threads that it starts behind the solver's.
+fn made(work: impl FnOnce() -> RecordingStreamResult<RecordingStream> + Send) -> Result<RecordingStream, ViewerError> {
+    let setup = |e: RecordingStreamError| ViewerError::Setup { cause: e.to_string() };
+    in_background(work).ok_or_else(|| ViewerError::Setup { cause: "no thread can be started".into() })?.map_err(setup)
 }
 
 /// A stream into a recording that the caller made.
