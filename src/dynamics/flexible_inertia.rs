@@ -107,7 +107,8 @@ impl FlexibleInertia {
         }
     }
 
-    /// Velocity terms for angular velocity `omega` (body axes) and the modal rates that [`Self::evaluate`] had: returns the rigid rows of b, writes the modal rows.
+    /// Velocity terms for angular velocity `omega` (body axes) and the modal rates that [`Self::evaluate`] had: returns the rigid rows of b,
+    /// writes the modal rows.
     pub fn velocity_terms(
         &self,
         integrals: &ModalIntegrals,

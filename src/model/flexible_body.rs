@@ -225,16 +225,12 @@ impl FlexibleBody {
     /// Modal spring and damper forces `K eta + C eta_dot`, written to `out` (length n).
     pub fn elastic_force(&self, eta: &[f64], eta_dot: &[f64], out: &mut [f64]) {
         for (j, o) in out.iter_mut().enumerate() {
-            *o = self.damping[j] * eta_dot[j] + self.stiffness[j] * eta[j];
-        }
-        if let Some(full) = &self.full_stiffness {
-            for (j, o) in out.iter_mut().enumerate() {
-                *o = self.damping[j] * eta_dot[j] + full.row(j).iter().zip(eta).map(|(k, e)| k * e).sum::<f64>();
-            }
+            *o = self.elastic_force_on(j, eta, eta_dot);
         }
     }
 
     /// The same on mode `j` alone.
+    #[inline]
     #[must_use]
     pub fn elastic_force_on(&self, j: usize, eta: &[f64], eta_dot: &[f64]) -> f64 {
         let spring = match &self.full_stiffness {

@@ -156,6 +156,14 @@ impl System {
         self.bodies.iter().position(|b| b.hinge.name == name)
     }
 
+    /// External loads on a body.
+    #[must_use]
+    pub fn loads_of(&self, body: usize) -> &[Load] {
+        let first = self.loads.partition_point(|l| l.body < body);
+        let count = self.loads[first..].partition_point(|l| l.body == body);
+        &self.loads[first..first + count]
+    }
+
     /// What the sweeps do at a body.
     #[inline]
     #[must_use]

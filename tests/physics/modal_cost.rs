@@ -56,13 +56,6 @@ fn time_per_body(modes: usize, order: InertiaOrder) -> f64 {
 #[test]
 #[ignore = "prints times"]
 fn time_per_flexible_body() {
-    // PLIANT_ORDER0: a loop to profile
-    if std::env::var_os("PLIANT_ORDER0").is_some() {
-        (0..20).for_each(|_| {
-            time_per_body(12, InertiaOrder::Zeroth);
-        });
-        return;
-    }
     for modes in [6, 12, 24, 48, 96] {
         let [zeroth, first, second] =
             [InertiaOrder::Zeroth, InertiaOrder::First, InertiaOrder::Second].map(|order| time_per_body(modes, order) * 1e9);

@@ -91,7 +91,7 @@ impl FlexibleLink {
         turn: &Matrix3<f64>,
     ) -> Self {
         let (n, blocks, tips) = (shape.modes, block_count(shape.modes), children.len());
-        let loaded = system.loads.iter().any(|l| l.body == body);
+        let loaded = !system.loads_of(body).is_empty();
         let deformed =
             || Deformed { inertia: FlexibleInertia::new(n), rows: shape.rows.clone(), residual: Six::ZERO, b_modal: vec![0.0; n] };
         Self {
@@ -212,8 +212,7 @@ impl FlexibleLink {
         self.external_force = Vector6::zeros();
         self.external.fill(0.0);
         let eta = &state.modal_position[body.modal_range()];
-        let first = system.loads.partition_point(|l| l.body < self.body);
-        for load in system.loads[first..].iter().take_while(|l| l.body == self.body) {
+        for load in system.loads_of(self.body) {
             let value = load.value(state.time);
             let value = match load.axes {
                 LoadAxes::World => rotate_back(&self.rotation, &value),

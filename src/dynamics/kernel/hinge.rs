@@ -35,7 +35,6 @@ pub struct GeneralHinge {
 impl GeneralHinge {
     /// Of body `body`.
     pub fn new(body: usize) -> Self {
-        let zero = SpatialInertia::default();
         Self {
             body,
             pose: HingePose::default(),
@@ -47,14 +46,7 @@ impl GeneralHinge {
             prescribed: [0.0; MAX_RATES],
             applied: [0.0; MAX_RATES],
             nu: [0.0; MAX_RATES],
-            inertia: BodyInertia {
-                P: zero,
-                P_hinge: zero,
-                P_plus: zero,
-                S: zero,
-                G: [Vector6::zeros(); MAX_RATES],
-                D: [[0.0; MAX_RATES]; MAX_RATES],
-            },
+            inertia: BodyInertia::default(),
         }
     }
 
@@ -104,20 +96,20 @@ impl GeneralHinge {
     ) -> Result<(SpatialInertia, Vector6<f64>), Doubtful> {
         let body = &system.bodies[self.body];
         let m = body.hinge.kind.rate_count();
+        let applied = &mut self.applied[..m];
+        body.hinge.applied_force(state.time, &state.position[body.position_range()], &state.velocity[body.velocity_range()], applied);
         if matches!(body.hinge.kind, HingeKind::Free) && !body.hinge.is_prescribed() {
-            return self.release(system, state, inertia, force);
+            return self.release(inertia, force);
         }
         self.inertia.P_hinge = *inertia;
         eliminate_hinge(body, &self.map, None, &mut self.inertia, |_| f64::INFINITY).map_err(|_| Doubtful)?;
-        let applied = &mut self.applied[..m];
-        body.hinge.applied_force(state.time, &state.position[body.position_range()], &state.velocity[body.velocity_range()], applied);
         let left = self.inertia.P_plus;
         if body.hinge.is_prescribed() {
             return Ok((left, force + left.times(&self.bias)));
         }
         let mut z = *force;
         for i in 0..m {
-            let epsilon = applied[i] - self.map[i].dot(force);
+            let epsilon = self.applied[i] - self.map[i].dot(force);
             self.nu[i] = epsilon;
             z += self.inertia.G[i] * epsilon;
         }
@@ -127,20 +119,7 @@ impl GeneralHinge {
 
     /// The same through a free hinge, which transmits what acts on its rates and nothing else. Its map H is a rotation of both halves, so
     /// that `G = H` and `nu = H* P^-1 (H applied - z)`.
-    fn release(
-        &mut self,
-        system: &System,
-        state: &State,
-        inertia: &SpatialInertia,
-        force: &Vector6<f64>,
-    ) -> Result<(SpatialInertia, Vector6<f64>), Doubtful> {
-        let body = &system.bodies[self.body];
-        body.hinge.applied_force(
-            state.time,
-            &state.position[body.position_range()],
-            &state.velocity[body.velocity_range()],
-            &mut self.applied,
-        );
+    fn release(&mut self, inertia: &SpatialInertia, force: &Vector6<f64>) -> Result<(SpatialInertia, Vector6<f64>), Doubtful> {
         let felt = Vector6::from(self.applied);
         let felt = spatial(&(self.rotation * angular(&felt)), &(self.rotation * linear(&felt)));
         let free = solve_positive(inertia, felt - force).ok_or(Doubtful)?;
@@ -253,8 +232,7 @@ pub fn velocities(
 pub fn external_force(system: &System, state: &State, k: usize, motion: &Motion, turn: &Matrix3<f64>) -> Vector6<f64> {
     let rotation = Matrix3::from_column_slice(&motion[..9]) * turn.transpose();
     let mut total = Vector6::zeros();
-    let first = system.loads.partition_point(|l| l.body < k);
-    for load in system.loads[first..].iter().take_while(|l| l.body == k) {
+    for load in system.loads_of(k) {
         let value = load.value(state.time);
         let axes = match load.axes {
             LoadAxes::World => Matrix3::identity(),

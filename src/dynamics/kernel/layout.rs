@@ -135,8 +135,7 @@ impl Layout {
                 index(layout.shapes.len() - 1)
             });
             let is_rigid = body.flexible().is_none();
-            let load =
-                if is_rigid && system.loads.binary_search_by_key(&k, |l| l.body).is_ok() { push(&mut layout.loaded, k) } else { NONE };
+            let load = if is_rigid && !system.loads_of(k).is_empty() { push(&mut layout.loaded, k) } else { NONE };
             let mut link = Link {
                 parent: body.parent.map_or(NONE, index),
                 shape,
@@ -231,16 +230,15 @@ fn drive_of(k: usize, body: &Body) -> (Option<Drive>, f64) {
 
 /// A rotation that takes the third axis to `axis`; one that only changes places and signs if `axis` is a coordinate axis.
 fn turn_to(axis: &Vector3<f64>) -> Matrix3<f64> {
-    let (x, y, z) = (Vector3::x(), Vector3::y(), Vector3::z());
-    // the coordinate axis that is furthest from it is the first to be made normal to it
-    let other = match axis.iamin() {
-        0 => x,
-        1 => y,
-        _ => z,
-    };
-    if *axis == z {
+    if *axis == Vector3::z() {
         return Matrix3::identity();
     }
+    // the coordinate axis that is furthest from it is the first to be made normal to it
+    let other = match axis.iamin() {
+        0 => Vector3::x(),
+        1 => Vector3::y(),
+        _ => Vector3::z(),
+    };
     let first = other - axis * axis.dot(&other);
     let first = first / first.norm();
     Matrix3::from_columns(&[first, axis.cross(&first), *axis])

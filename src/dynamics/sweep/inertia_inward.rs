@@ -23,7 +23,7 @@ use crate::spatial::shift::{force_from, motion_to, rotate_back};
 use nalgebra::{Matrix6, Vector3, Vector6};
 
 /// What the sweep leaves of one hinge.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub struct BodyInertia {
     /// Articulated inertia of the recursion's frame (O, or B of a flexible body): `P_rr`.
     pub P: SpatialInertia,
@@ -99,15 +99,6 @@ impl InertiaScratch {
     /// Room for `system`.
     #[must_use]
     pub fn new(system: &System) -> Self {
-        let zero = SpatialInertia::default();
-        let empty = BodyInertia {
-            P: zero,
-            P_hinge: zero,
-            P_plus: zero,
-            S: zero,
-            G: [Vector6::zeros(); MAX_RATES],
-            D: [[0.0; MAX_RATES]; MAX_RATES],
-        };
         let (mut children, mut all_children) = (vec![Vec::new(); system.bodies.len()], vec![Vec::new(); system.bodies.len()]);
         let inside = |k, parent| system.aggregates.iter().any(|a| a.member_of(k).is_some() && a.member_of(parent).is_some());
         for (k, body) in system.bodies.iter().enumerate() {
@@ -130,7 +121,7 @@ impl InertiaScratch {
             })
         };
         Self {
-            bodies: vec![empty; system.bodies.len()],
+            bodies: vec![BodyInertia::default(); system.bodies.len()],
             flexible: system.bodies.iter().enumerate().filter_map(eliminate).collect(),
             aggregates: system.aggregates.iter().map(AggregateInertia::new).collect(),
             with_added: false,
