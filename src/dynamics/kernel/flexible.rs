@@ -129,8 +129,8 @@ impl FlexibleLink {
         let Some(flexible) = body.flexible() else { return };
         let range = body.modal_range();
         let (eta, eta_dot) = (&state.modal_position[range.clone()], &state.modal_velocity[range]);
-        self.rotation = Matrix3::from_column_slice(&motion[..9]) * self.frame;
-        self.omega = self.rotation.tr_mul(&Vector3::new(motion[9], motion[10], motion[11]));
+        self.rotation = motion.rotation() * self.frame;
+        self.omega = self.rotation.tr_mul(&motion.angular_velocity());
         let omega = self.omega;
         self.bias = spatial(&Vector3::zeros(), &-omega.cross(&omega.cross(&self.origin)));
         fill(eta, &mut self.position);

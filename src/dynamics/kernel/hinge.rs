@@ -2,7 +2,8 @@
 
 use super::flexible::FlexibleLink;
 use super::layout::{Layout, Passage, Shape};
-use super::{Doubtful, Motion, carrier};
+use super::record::Motion;
+use super::{Doubtful, carrier};
 use crate::dynamics::sweep::inertia_inward::{BodyInertia, SINGULAR, eliminate_hinge, solve_hinge};
 use crate::model::hinge::{HingePose, MAX_RATES};
 use crate::model::{HingeKind, LoadAxes, LoadPoint, State, System};
@@ -53,8 +54,8 @@ impl GeneralHinge {
     /// First pass: pose, map and bias; returns the motion of the body.
     pub fn follow(&mut self, system: &System, state: &State, shape: &Shape, parent: Option<&Motion>) -> Motion {
         let body = &system.bodies[self.body];
-        let (turn, omega) = parent
-            .map_or((Matrix3::identity(), Vector3::zeros()), |m| (Matrix3::from_column_slice(&m[..9]), Vector3::new(m[9], m[10], m[11])));
+        let parent = parent.unwrap_or(&Motion::REST);
+        let (turn, omega) = (parent.rotation(), parent.angular_velocity());
         let (q, v) = (&state.position[body.position_range()], &state.velocity[body.velocity_range()]);
         body.hinge.kind.pose(q, &mut self.pose);
         let outer = turn * Matrix3::from_column_slice(&shape.fixed);
@@ -80,10 +81,7 @@ impl GeneralHinge {
             }
         }
         let omega = omega + spin;
-        let mut motion = [0.0; 12];
-        motion[..9].copy_from_slice(rotation.as_slice());
-        motion[9..].copy_from_slice(omega.as_slice());
-        motion
+        Motion::new(&rotation, &omega)
     }
 
     /// Second pass: `P+` and `z+` from `P` and `z`.
@@ -200,8 +198,8 @@ pub fn velocities(
     out: &mut [Vector3<f64>],
 ) {
     for (k, link) in layout.links.iter().enumerate().take(out.len()) {
-        let parent = carrier(link, layout, motion, flexible);
-        let omega = parent.map_or_else(Vector3::zeros, |m| Vector3::new(m[9], m[10], m[11]));
+        let parent = carrier(link, layout, motion, flexible).unwrap_or(&Motion::REST);
+        let omega = parent.angular_velocity();
         let base = match layout.tips.get(link.tip as usize) {
             None => out.get(link.parent as usize).copied().unwrap_or_default(),
             Some(&(body, tip)) => flexible[body as usize].tips[tip as usize].velocity,
@@ -210,12 +208,11 @@ pub fn velocities(
             let own = &general[link.general as usize];
             (own.l, linear(&own.relative))
         } else {
-            let (turn, shape) =
-                (parent.map_or_else(Matrix3::identity, |m| Matrix3::from_column_slice(&m[..9])), &layout.shapes[link.shape as usize]);
-            let offset = turn * Vector3::from(shape.offset);
+            let shape = &layout.shapes[link.shape as usize];
+            let offset = parent.rotation() * Vector3::from(shape.offset);
             match link.passage {
                 Passage::Slide => {
-                    let travel = Vector3::new(motion[k][6], motion[k][7], motion[k][8]) * shape.travel_rate;
+                    let travel = motion[k].rotation().column(2) * shape.travel_rate;
                     (offset + travel * state.position[link.q as usize], travel * state.velocity[link.v as usize])
                 }
                 _ => (offset, Vector3::zeros()),
@@ -230,7 +227,7 @@ pub fn velocities(
 
 /// Force of the external loads on body `k` at O in inertial axes.
 pub fn external_force(system: &System, state: &State, k: usize, motion: &Motion, turn: &Matrix3<f64>) -> Vector6<f64> {
-    let rotation = Matrix3::from_column_slice(&motion[..9]) * turn.transpose();
+    let rotation = motion.rotation() * turn.transpose();
     let mut total = Vector6::zeros();
     for load in system.loads_of(k) {
         let value = load.value(state.time);

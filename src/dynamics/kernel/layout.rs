@@ -23,12 +23,36 @@ pub struct Shape {
     pub inertia: [f64; 9],
     /// Link axes to O axes.
     pub turn: Matrix3<f64>,
-    /// Its columns, and whether it is more than the identity.
-    pub turn_columns: [[f64; 4]; 3],
-    pub is_turned: bool,
+    /// What it does with the axes.
+    pub axes: Axes,
     /// Turn (rad) and travel (m) along the third axis per unit of the coordinate of a hinge of one rate.
     pub turn_rate: f64,
     pub travel_rate: f64,
+}
+
+/// Which link axes (x, y, z) the axes of O are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Axes {
+    /// (x, y, z): the hinge axis is that of O.
+    Same,
+    /// (y, z, x).
+    Next,
+    /// Neither.
+    Turned,
+}
+
+impl Axes {
+    /// For link axes that `turn` takes to O axes.
+    fn of(turn: &Matrix3<f64>) -> Self {
+        let (x, y, z) = (Vector3::x(), Vector3::y(), Vector3::z());
+        if *turn == Matrix3::identity() {
+            Self::Same
+        } else if *turn == Matrix3::from_columns(&[z, x, y]) {
+            Self::Next
+        } else {
+            Self::Turned
+        }
+    }
 }
 
 /// How the passes take a hinge.
@@ -228,10 +252,13 @@ fn drive_of(k: usize, body: &Body) -> (Option<Drive>, f64) {
     (needed.then_some(drive), torque.unwrap_or(0.0))
 }
 
-/// A rotation that takes the third axis to `axis`; one that only changes places and signs if `axis` is a coordinate axis.
+/// A rotation that takes the third axis to `axis`; one that only changes places if `axis` is a coordinate axis.
 fn turn_to(axis: &Vector3<f64>) -> Matrix3<f64> {
-    if *axis == Vector3::z() {
-        return Matrix3::identity();
+    for first in 0..3 {
+        let (a, b, c) = (Vector3::ith(first, 1.0), Vector3::ith((first + 1) % 3, 1.0), Vector3::ith((first + 2) % 3, 1.0));
+        if *axis == c {
+            return Matrix3::from_columns(&[a, b, c]);
+        }
     }
     // the coordinate axis that is furthest from it is the first to be made normal to it
     let other = match axis.iamin() {
@@ -271,8 +298,7 @@ impl Shape {
             mass: if body.flexible().is_some() { 0.0 } else { body.mass() },
             inertia: column((rotational + rotational.transpose()) * 0.5),
             turn,
-            turn_columns: std::array::from_fn(|j| [turn[(0, j)], turn[(1, j)], turn[(2, j)], 0.0]),
-            is_turned: turn != Matrix3::identity(),
+            axes: Axes::of(&turn),
             turn_rate: single.map_or(0.0, |s| s.1),
             travel_rate: single.map_or(0.0, |s| s.2),
         }

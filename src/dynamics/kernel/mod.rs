@@ -7,10 +7,10 @@
 //!
 //! | pass | leaves | numbers per body |
 //! |---|---|---|
-//! | `outward`: attitude and angular velocity | `Motion` | 12 |
+//! | `outward`: attitude and angular velocity | `Motion` | 16 |
 //! | `inward`: articulated inertias, residual forces | `Gain` | 8 |
 //! | the same, where loads are asked for | `Outboard` | 36 |
-//! | `accelerate`: accelerations and loads | the load, in place of the above | |
+//! | `accelerate`: accelerations and loads | the load | 6 |
 //!
 //! Modes are the business of `flexible`, in the axes of each body.
 //!
@@ -21,36 +21,27 @@
 //! Axes: "link axes" are those of O, turned so that the axis of a hinge of one rate is their third. Registers: [`crate::spatial::lanes`].
 
 mod accelerate;
+mod cyclic;
 mod flexible;
 mod hinge;
 mod inward;
 mod layout;
 mod modal_shape;
 mod outward;
+mod record;
 mod rows;
 mod six;
 mod tip;
 
 use crate::model::{State, System};
-use crate::spatial::lanes::{Kernel, Lanes, Processor, quad};
+use crate::spatial::lanes::{Kernel, Lanes, Processor};
 use crate::spatial::shift::spatial;
 use flexible::FlexibleLink;
 use hinge::GeneralHinge;
 use layout::{Layout, Link, NONE, Passage, Shape};
 use modal_shape::ModalShape;
 use nalgebra::{Vector3, Vector6};
-
-/// Attitude (three columns: link axes to inertial axes) and angular velocity (inertial axes) of one body.
-pub(super) type Motion = [f64; 12];
-
-/// `G = P H* / D` (angular; linear) and `nu` of a hinge of one rate, inertial axes at O.
-pub(super) type Gain = [f64; 8];
-
-/// Numbers of an [`Outboard`]; the last three fill up.
-const RECORD: usize = 36;
-
-/// `P+` (rotational, coupling, translational: nine numbers each, by columns) and `z+` at O in inertial axes; then the load in O axes in the first six.
-pub(super) type Outboard = [f64; RECORD];
+use record::{Gain, Motion, Outboard};
 
 /// Quantities of a body that some child does not follow directly.
 #[derive(Debug, Clone, Copy)]
@@ -73,6 +64,8 @@ pub struct TreeKernel {
     motion: Vec<Motion>,
     gains: Vec<Gain>,
     outboard: Vec<Outboard>,
+    /// Load at every hinge: (moment about O; force), O axes.
+    loads: Vec<Vector6<f64>>,
     branches: Vec<Branch>,
     general: Vec<GeneralHinge>,
     flexible: Vec<FlexibleLink>,
@@ -105,10 +98,11 @@ impl TreeKernel {
         }
         Some(Self {
             processor,
-            motion: vec![[0.0; 12]; n],
-            gains: vec![[0.0; 8]; n],
-            outboard: vec![[0.0; RECORD]; if with_loads { n } else { 0 }],
-            branches: vec![Branch { felt: [0.0; RECORD], acceleration: [0.0; 6] }; layout.branches],
+            motion: vec![Motion::REST; n],
+            gains: vec![Gain::default(); n],
+            outboard: vec![Outboard::default(); if with_loads { n } else { 0 }],
+            loads: vec![Vector6::zeros(); if with_loads { n } else { 0 }],
+            branches: vec![Branch { felt: Outboard::default(), acceleration: [0.0; 6] }; layout.branches],
             general: layout.general.iter().map(|&body| GeneralHinge::new(body)).collect(),
             velocity: vec![Vector3::zeros(); system.loads.iter().map(|l| l.body + 1).max().unwrap_or(0)],
             external: vec![Vector6::zeros(); layout.loaded.len()],
@@ -129,24 +123,16 @@ impl TreeKernel {
         let _ = self.processor.run(Evaluation { tree: self, system, state, hinge, modal, passes });
     }
 
-    /// True if evaluations leave hinge loads.
-    #[must_use]
-    pub fn holds_loads(&self) -> bool {
-        !self.outboard.is_empty()
-    }
-
     /// Load at the hinge of body `k` after the last evaluation: (moment N m about O; force N), by the parent on the child, O axes. Not a
     /// number if loads were not asked for.
     #[must_use]
     pub fn hinge_load(&self, k: usize) -> Vector6<f64> {
-        self.outboard.get(k).map_or_else(|| Vector6::repeat(f64::NAN), |load| Vector6::from_column_slice(&load[..6]))
+        self.loads.get(k).copied().unwrap_or_else(|| Vector6::repeat(f64::NAN))
     }
 
-    /// All of them, one per body, where there is room for them.
-    pub(super) fn copy_loads(&self, out: &mut [Vector6<f64>]) {
-        for (out, load) in out.iter_mut().zip(&self.outboard) {
-            *out = Vector6::new(load[0], load[1], load[2], load[3], load[4], load[5]);
-        }
+    /// All of them, one per body; none if loads were not asked for.
+    pub(super) fn hinge_loads(&self) -> &[Vector6<f64>] {
+        &self.loads
     }
 
     /// Power (W) of motors, dampers, prescribed motions and external loads at the last evaluation, at `state`.
@@ -163,8 +149,7 @@ impl TreeKernel {
             }
         }
         for (&body, force) in self.layout.loaded.iter().zip(&self.external) {
-            let m = &self.motion[body];
-            total += force.dot(&spatial(&Vector3::new(m[9], m[10], m[11]), &self.velocity[body]));
+            total += force.dot(&spatial(&self.motion[body].angular_velocity(), &self.velocity[body]));
         }
         total + self.flexible.iter().map(|f| f.power(system, state, &self.modal_shapes[f.shape])).sum::<f64>()
     }
@@ -212,24 +197,6 @@ impl Kernel for Evaluation<'_> {
     }
 }
 
-/// The attitude of one body in registers.
-#[inline(always)]
-fn attitude<L: Lanes>(s: L, m: &Motion) -> [L::V; 3] {
-    [s.load(quad(m, 0)), s.load(quad(m, 3)), s.load(quad(m, 6))]
-}
-
-/// The angular velocity of one body in a register.
-#[inline(always)]
-fn angular_velocity<L: Lanes>(s: L, m: &Motion) -> L::V {
-    s.last_three(quad(m, 8))
-}
-
-/// Attitude of the inertial frame.
-#[inline(always)]
-fn no_turn<L: Lanes>(s: L) -> [L::V; 3] {
-    [s.load([1.0, 0.0, 0.0, 0.0]), s.load([0.0, 1.0, 0.0, 0.0]), s.load([0.0, 0.0, 1.0, 0.0])]
-}
-
 /// What the motion of the parent makes of a hinge of at most one rate.
 struct Arm<V> {
     /// O of the parent to O of the link.
@@ -263,10 +230,8 @@ fn arm<L: Lanes>(s: L, link: &Link, shape: &Shape, state: &State, parent: [L::V;
 /// Attitude and angular velocity of what carries `link`: its parent, or the frame on the parent that modes move.
 #[inline(always)]
 fn parent_motion<L: Lanes>(s: L, link: &Link, layout: &Layout, motion: &[Motion], flexible: &[FlexibleLink]) -> ([L::V; 3], L::V) {
-    match carrier(link, layout, motion, flexible) {
-        Some(m) => (attitude(s, m), angular_velocity(s, m)),
-        None => (no_turn(s), s.splat(0.0)),
-    }
+    let m = carrier(link, layout, motion, flexible).unwrap_or(&Motion::REST);
+    (record::block(s, &m.turn), s.load(m.omega))
 }
 
 #[inline(always)]

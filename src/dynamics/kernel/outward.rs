@@ -1,7 +1,8 @@
 //! First pass: attitude and angular velocity of every body, from the base to the tips. Source: Paper Eq. 8, in inertial axes.
 
 use super::layout::{Passage, Shape};
-use super::{Motion, NONE, TreeKernel, angular_velocity, attitude, carrier, no_turn, parent_motion};
+use super::record::{Motion, block, stored};
+use super::{NONE, TreeKernel, carrier, parent_motion};
 use crate::model::{State, System};
 use crate::spatial::lanes::Lanes;
 
@@ -9,7 +10,7 @@ use crate::spatial::lanes::Lanes;
 #[inline(always)]
 pub fn outward<L: Lanes>(s: L, tree: &mut TreeKernel, system: &System, state: &State) {
     let TreeKernel { layout, motion, general, flexible, modal_shapes, velocity, .. } = tree;
-    let (mut last, mut turn, mut omega) = (NONE, no_turn(s), s.splat(0.0));
+    let (mut last, mut turn, mut omega) = (NONE, block(s, &Motion::REST.turn), s.splat(0.0));
     for (k, link) in layout.links.iter().enumerate() {
         if link.parent != last || link.tip != NONE {
             (turn, omega) = parent_motion(s, link, layout, motion, flexible);
@@ -19,7 +20,7 @@ pub fn outward<L: Lanes>(s: L, tree: &mut TreeKernel, system: &System, state: &S
             let own = &mut general[link.general as usize];
             let parent = carrier(link, layout, motion, flexible).copied();
             motion[k] = own.follow(system, state, shape, parent.as_ref());
-            (turn, omega) = (attitude(s, &motion[k]), angular_velocity(s, &motion[k]));
+            (turn, omega) = (block(s, &motion[k].turn), s.load(motion[k].omega));
         } else {
             turn = fixed(s, shape, turn);
             match link.passage {
@@ -33,7 +34,7 @@ pub fn outward<L: Lanes>(s: L, tree: &mut TreeKernel, system: &System, state: &S
                 }
                 _ => {}
             }
-            motion[k] = record(s, turn, omega);
+            motion[k] = Motion { turn: stored(s, turn), omega: s.store(omega) };
         }
         if let Some(own) = flexible.get_mut(link.flexible as usize) {
             let constants = &modal_shapes[own.shape];
@@ -63,10 +64,4 @@ fn turned<L: Lanes>(s: L, [x, y, z]: [L::V; 3], angle: f64) -> [L::V; 3] {
     let (sine, cosine) = angle.sin_cos();
     let (sine, cosine) = (s.splat(sine), s.splat(cosine));
     [s.mul_add(x, cosine, s.mul(y, sine)), s.mul_take(x, sine, s.mul(y, cosine)), z]
-}
-
-#[inline(always)]
-fn record<L: Lanes>(s: L, turn: [L::V; 3], omega: L::V) -> Motion {
-    let (a, b, c, w) = (s.three(turn[0]), s.three(turn[1]), s.three(turn[2]), s.three(omega));
-    [a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2], w[0], w[1], w[2]]
 }

@@ -1,11 +1,12 @@
 //! A child that the modes of its parent move: the frame O+ that carries it, and what crosses that frame.
 #![expect(non_snake_case, reason = "symbols follow the table in dynamics/mod.rs")]
 
+use super::cyclic::{columns, symmetric_columns};
+use super::record::{Motion, Outboard};
 use super::rows::{Block, two_products};
 use super::six::{Pair, Six};
-use super::{Motion, Outboard, RECORD};
 use crate::model::Attachment;
-use crate::spatial::lanes::{Lanes, quad};
+use crate::spatial::lanes::Lanes;
 use crate::spatial::rotation::{skew, turning_frame};
 use crate::spatial::shift::spatial;
 use nalgebra::{Matrix3, Vector3, Vector6};
@@ -47,9 +48,9 @@ impl Tip {
     pub fn new(child: usize) -> Self {
         Self {
             child,
-            motion: [0.0; 12],
+            motion: Motion::REST,
             velocity: Vector3::zeros(),
-            felt: [0.0; RECORD],
+            felt: Outboard::default(),
             acceleration: [0.0; 6],
             e: [[0.0; 4]; 2],
             Z: Six::ZERO,
@@ -95,8 +96,7 @@ impl Tip {
             + spin.cross(&lever)
             + of_frame.cross(&of_frame.cross(&lever));
         self.bias = spatial(&spin, &linear);
-        self.motion[..9].copy_from_slice((rotation * (axes * side.offset_rotation)).as_slice());
-        self.motion[9..].copy_from_slice((rotation * of_frame).as_slice());
+        self.motion = Motion::new(&(rotation * (axes * side.offset_rotation)), &(rotation * of_frame));
     }
 
     /// Velocity of O+ on a body whose frame B moves with (`omega`, `v`).
@@ -108,11 +108,11 @@ impl Tip {
     /// `S` and the force felt at O+, its bias included.
     #[inline(always)]
     pub fn gather<L: Lanes>(&self, s: L, rotation: &Matrix3<f64>) -> (Six, Pair<L::V>) {
-        let f = &self.felt;
+        let (inertia, wrench) = (self.felt.inertia(s), self.felt.wrench(s));
         let back = rows_of(s, rotation);
-        let rotational = turned(s, f, 0, rotation, back);
-        let coupling = turned(s, f, 9, rotation, back);
-        let translational = turned(s, f, 18, rotation, back);
+        let rotational = turned(s, symmetric_columns(s, inertia.rotational), rotation, back);
+        let coupling = turned(s, columns(s, inertia.coupling), rotation, back);
+        let translational = turned(s, symmetric_columns(s, inertia.translational), rotation, back);
         let (x, y, z) = (s.three(coupling[0]), s.three(coupling[1]), s.three(coupling[2]));
         let mut S = Six::ZERO;
         for j in 0..3 {
@@ -121,7 +121,7 @@ impl Tip {
         }
         let b = &self.bias;
         let [moment, force] = S.combine(s, [b[0], b[1], b[2], b[3], b[4], b[5]]);
-        let own = [s.combine(back, s.load(quad(f, 27))), s.combine(back, s.load(quad(f, 30)))];
+        let own = [s.combine(back, wrench[0]), s.combine(back, wrench[1])];
         (S, [s.add(own[0], moment), s.add(own[1], force)])
     }
 
@@ -195,10 +195,9 @@ pub fn rows_of<L: Lanes>(s: L, m: &Matrix3<f64>) -> [L::V; 3] {
     [s.of_three([m[0], m[3], m[6]]), s.of_three([m[1], m[4], m[7]]), s.of_three([m[2], m[5], m[8]])]
 }
 
-/// `R' B R` of the block at `at` of a record; `back` holds the rows of R.
+/// `R' B R`; `back` holds the rows of R.
 #[inline(always)]
-fn turned<L: Lanes>(s: L, f: &Outboard, at: usize, r: &Matrix3<f64>, back: [L::V; 3]) -> [L::V; 3] {
-    let block = [s.load(quad(f, at)), s.load(quad(f, at + 3)), s.load(quad(f, at + 6))];
+fn turned<L: Lanes>(s: L, block: [L::V; 3], r: &Matrix3<f64>, back: [L::V; 3]) -> [L::V; 3] {
     [
         s.combine(back, s.combine_numbers(block, [r[0], r[1], r[2]])),
         s.combine(back, s.combine_numbers(block, [r[3], r[4], r[5]])),
