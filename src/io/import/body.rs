@@ -2,7 +2,7 @@
 
 use super::error::{ImportError, printable, refused};
 use super::interface_fit::{Fit, fit, select};
-use super::lumping::{Tensors, modal_mass, nodal_mass};
+use super::lumping::{Tensors, nodal_mass};
 use super::mesh::ForeignModel;
 use super::modes;
 use super::options::{ImportOptions, InterfaceRequest};
@@ -144,7 +144,7 @@ fn write(file: &Path, options: &ImportOptions, out: &Path) -> Result<ImportRepor
     let (mut displacement, mut rotation) = (modes.displacement, modes.rotation);
     let held = boundary::settle(&model, options, &fits, root, &nodal.mass, &mut displacement, rotation.as_mut())?;
     report.approximated.extend(held.note);
-    let change = orthonormalise(file, &modal_mass(&nodal.mass, &displacement))?;
+    let change = orthonormalise(file, &nodal.mass, &displacement)?;
     report.departure = change.departure;
     let scale = if change.were_normalised { "orthonormality" } else { "orthogonality (the modes came in another scale)" };
     report.approximated.push(format!("modes orthonormalised; they departed from {scale} with these masses by {:.1e}", change.departure));
