@@ -1,20 +1,15 @@
-//! Sets of modes: duplicates, nearly dependent ones, all that a mesh has, and any basis of the same motion (S13, S14).
+//! Sets of modes: duplicates, nearly dependent ones, and all that a mesh has (S13).
 
 use crate::row::{EPS, Row, assert_rows, componentwise};
 use crate::support::lumped::lumped_body_of;
-use crate::support::scenes::{Z, difference, exact_beam, flexible, hinge, rigid};
-use crate::support::trees::{Recipe, random_tree};
-use nalgebra::{DMatrix, Matrix6, Vector6};
-use pliant::dynamics::hinge_load::hinge_load;
-use pliant::dynamics::{Workspace, dense, forward_dynamics};
-use pliant::model::build::{BodyDefinition, BodyDefinitionKind, Definition, WORLD};
-use pliant::model::flexible_body::ModalIntegrals;
+use crate::support::scenes::{Z, exact_beam, flexible, hinge, rigid};
+use nalgebra::{Matrix6, Vector6};
+use pliant::dynamics::{Workspace, forward_dynamics};
+use pliant::model::build::{Definition, WORLD};
 use pliant::model::modal_body::{Boundary, ModalBody};
 use pliant::spatial::SpatialInertia;
 use rand::SeedableRng;
 use rand::rngs::StdRng;
-use std::f64::consts::TAU;
-use std::sync::Arc;
 
 /// The beam of `modes` on a revolute hinge at its root.
 fn pinned(beam: ModalBody) -> Definition {
@@ -145,74 +140,4 @@ fn all_modes_of_a_mesh_leave_the_root_node_and_a_positive_semidefinite_inertia()
         ));
     }
     assert_rows(&rows);
-}
-
-/// The same body in modal coordinates zeta with eta = T zeta, T orthogonal: full stiffness `T' K T`.
-fn turned(modal: &ModalBody, t: &DMatrix<f64>) -> ModalBody {
-    let n = modal.mode_count();
-    let stiffness = modal
-        .stiffness
-        .clone()
-        .unwrap_or_else(|| DMatrix::from_fn(n, n, |i, j| if i == j { (TAU * modal.frequency_hz[i]).powi(2) } else { 0.0 }));
-    let mut out = modal.clone();
-    for k in 0..n {
-        out.momentum[k] = (0..n).map(|j| modal.momentum[j] * t[(j, k)]).sum();
-        out.first_moment[k] = (0..n).map(|j| modal.first_moment[j] * t[(j, k)]).sum();
-        for l in 0..n {
-            out.second_moment[k * n + l] = (0..n * n).map(|i| modal.second_moment[i] * (t[(i / n, k)] * t[(i % n, l)])).sum();
-        }
-        for (new, old) in out.interfaces.iter_mut().zip(&modal.interfaces) {
-            new.mode_shape[k] = (0..n).map(|j| old.mode_shape[j] * t[(j, k)]).sum::<Vector6<f64>>();
-        }
-    }
-    out.stiffness = Some(t.transpose() * stiffness * t);
-    out
-}
-
-/// Q of a QR decomposition of fixed numbers.
-fn orthogonal(n: usize) -> DMatrix<f64> {
-    DMatrix::from_fn(n, n, |i, j| ((i * 7 + j * 5 + i * j) as f64 * 0.83).sin()).qr().q()
-}
-
-fn in_turned_basis(definition: &Definition) -> Definition {
-    let mut out = definition.clone();
-    for BodyDefinition { kind, .. } in &mut out.bodies {
-        if let BodyDefinitionKind::Flexible(f) = kind {
-            let t = orthogonal(f.modal.mode_count());
-            let back = |x: &[f64]| t.tr_mul(&nalgebra::DVector::from_column_slice(x)).as_slice().to_vec();
-            (f.modal_position, f.modal_velocity) = (back(&f.modal_position), back(&f.modal_velocity));
-            f.modal = Arc::new(turned(&f.modal, &t));
-            f.integrals = Arc::new(ModalIntegrals::of(&f.modal));
-        }
-    }
-    out
-}
-
-/// S14: hinge accelerations and loads do not know the basis of the modes. The files that hold modes must be orthonormal, so that T is
-/// orthogonal: another one is refused with the file.
-#[test]
-fn hinge_accelerations_and_loads_do_not_depend_on_the_modal_basis() {
-    let mut worst = 0.0_f64;
-    for (seed, boundary) in [Boundary::Cantilever, Boundary::FreeFree, Boundary::General].into_iter().cycle().take(12).enumerate() {
-        // dampers of the modes would be of the old basis
-        let recipe = Recipe { flexible: 0.7, boundary: Some(boundary), dampers: false, ..Recipe::default() };
-        let definition = random_tree(seed as u64 + 300, &recipe);
-        let solve = |definition: &Definition| {
-            let (system, state) = definition.build().unwrap();
-            let mut workspace = Workspace::new(&system);
-            forward_dynamics(&system, &state, &mut workspace).unwrap();
-            let loads: Vec<f64> = (0..system.bodies.len()).flat_map(|k| hinge_load(&workspace, k).as_slice().to_vec()).collect();
-            (workspace.acceleration.hinge, loads, dense::equations(&system, &state).condition())
-        };
-        let ((a, f, condition), (b, g, _)) = (solve(&definition), solve(&in_turned_basis(&definition)));
-        // T itself has condition 1; the integrals are rounded anew, and the solve multiplies that by the condition of M
-        worst = worst.max(difference(&b, &a).max(difference(&g, &f)) / condition.max(10.0));
-    }
-    assert_rows(&[Row::at_most(
-        "S14",
-        "12 trees in turned modal bases: accelerations and loads over the condition of M",
-        worst,
-        200.0 * EPS,
-        "200 eps: ten sums of twenty terms",
-    )]);
 }
