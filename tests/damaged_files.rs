@@ -5,16 +5,16 @@
 
 #[path = "support/damage.rs"]
 mod damage;
+#[path = "support/limits.rs"]
+mod limits;
 
 use damage::{KINDS, damage};
+use limits::{CPU_LIMIT, run_within};
 use rand::rngs::StdRng;
 use rand::{Rng, SeedableRng};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
-use std::time::{Duration, Instant};
+use std::process::Output;
 
-/// An undamaged file of this size takes about 10 ms.
-const TIME_LIMIT: Duration = Duration::from_secs(10);
 /// Address space in KiB: the program needs 0.3 GiB, one refused array would be 2 GiB.
 const ADDRESS_SPACE_KIB: u64 = 2 << 20;
 /// Mutants per sample file; about 10 ms each.
@@ -26,39 +26,18 @@ fn data(name: &str) -> PathBuf {
 
 /// Runs `pliant check` within the limits; `None` if it had to be stopped.
 fn check(file: &Path) -> Option<Output> {
-    let program = env!("CARGO_BIN_EXE_pliant");
-    let mut command = if cfg!(target_os = "linux") {
-        let mut shell = Command::new("sh");
-        shell.args(["-c", &format!("ulimit -v {ADDRESS_SPACE_KIB}; exec \"$0\" check \"$1\""), program]);
-        shell
-    } else {
-        let mut direct = Command::new(program);
-        direct.arg("check");
-        direct
-    };
-    // the report is about 5 kB, less than a pipe holds, so that nothing has to be drained meanwhile
-    let mut child = command.arg(file).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    let start = Instant::now();
-    while child.try_wait().unwrap().is_none() {
-        if start.elapsed() > TIME_LIMIT {
-            child.kill().unwrap();
-            child.wait().unwrap();
-            return None;
-        }
-        std::thread::sleep(Duration::from_millis(1));
-    }
-    Some(child.wait_with_output().unwrap())
+    run_within(&["check".as_ref(), file.as_os_str()], ADDRESS_SPACE_KIB)
 }
 
 /// What is wrong with the outcome, if anything.
 fn complaint(file: &Path) -> Option<String> {
-    let Some(output) = check(file) else { return Some(format!("still running after {TIME_LIMIT:?}")) };
+    let Some(output) = check(file) else { return Some("waits for ever".to_owned()) };
     let message = String::from_utf8_lossy(&output.stderr).into_owned();
     match output.status.code() {
         Some(0) => None,
         Some(2) if message.starts_with("error: ") && message.contains(&*file.to_string_lossy()) => None,
         Some(code) => Some(format!("exit code {code}, message {message:?}")),
-        None => Some(format!("ended by a signal: {}, message {message:?}", output.status)),
+        None => Some(format!("ended by a signal ({CPU_LIMIT} s are allowed): {}, message {message:?}", output.status)),
     }
 }
 

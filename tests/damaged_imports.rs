@@ -7,16 +7,17 @@
 
 #[path = "support/damage.rs"]
 mod damage;
+#[path = "support/limits.rs"]
+mod limits;
 
 use damage::KINDS;
+use limits::{CPU_LIMIT, run_within};
 use rand::rngs::StdRng;
 use rand::{Rng, SeedableRng};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
+use std::process::Output;
 use std::time::{Duration, Instant};
 
-/// An undamaged file takes about 10 ms.
-const TIME_LIMIT: Duration = Duration::from_secs(10);
 /// Address space in KiB; what the program holds is less.
 const ADDRESS_SPACE_KIB: u64 = 1 << 20;
 /// Mutants per sample; about 10 ms each.
@@ -53,31 +54,16 @@ fn data(name: &str) -> PathBuf {
 
 /// Runs `pliant import` within the limits; `None` if it had to be stopped.
 fn import(file: &Path, keys: &Path) -> Option<Output> {
-    let program = env!("CARGO_BIN_EXE_pliant");
-    let mut command = if cfg!(target_os = "linux") {
-        let mut shell = Command::new("sh");
-        shell.args(["-c", &format!("ulimit -v {ADDRESS_SPACE_KIB}; exec \"$0\" \"$@\""), program]);
-        shell
-    } else {
-        Command::new(program)
-    };
-    command.arg("import").arg(file).arg("--keys").arg(keys).arg("--out").arg(file.with_file_name("out.h5"));
-    let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    let start = Instant::now();
-    while child.try_wait().unwrap().is_none() {
-        if start.elapsed() > TIME_LIMIT {
-            child.kill().unwrap();
-            child.wait().unwrap();
-            return None;
-        }
-        std::thread::sleep(Duration::from_millis(1));
-    }
-    Some(child.wait_with_output().unwrap())
+    let out = file.with_file_name("out.h5");
+    run_within(
+        &["import".as_ref(), file.as_os_str(), "--keys".as_ref(), keys.as_os_str(), "--out".as_ref(), out.as_os_str()],
+        ADDRESS_SPACE_KIB,
+    )
 }
 
 /// What is wrong with the outcome, if anything.
 fn complaint(file: &Path, keys: &Path) -> Option<String> {
-    let Some(output) = import(file, keys) else { return Some(format!("still running after {TIME_LIMIT:?}")) };
+    let Some(output) = import(file, keys) else { return Some("waits for ever".to_owned()) };
     let message = String::from_utf8_lossy(&output.stderr).into_owned();
     let folder = file.parent().unwrap().to_string_lossy().into_owned();
     let printable = |text: &str| text.chars().all(|c| c == '\n' || !c.is_control());
@@ -85,7 +71,7 @@ fn complaint(file: &Path, keys: &Path) -> Option<String> {
         Some(0) => None,
         Some(2) if message.starts_with("error: ") && message.contains(&folder) && printable(&message) => None,
         Some(code) => Some(format!("exit code {code}, message {message:?}")),
-        None => Some(format!("ended by a signal: {}, message {message:?}", output.status)),
+        None => Some(format!("ended by a signal ({CPU_LIMIT} s are allowed): {}, message {message:?}", output.status)),
     }
 }
 
