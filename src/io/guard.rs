@@ -21,7 +21,9 @@ const CHUNK_COUNT_LIMIT: u64 = 1 << 20;
 /// Most that one byte of deflate can unpack to: 258 bytes from two bits.
 const DEFLATE_RATIO: u64 = 1032;
 /// Most objects outside `/VTKHDF`, and deepest path: the schema needs two objects a mode and three levels.
-const OBJECT_LIMIT: usize = 100_000;
+pub(super) const OBJECT_LIMIT: usize = 100_000;
+/// Most attributes of one object: each is looked at whenever one is asked for, and objects may be links to one another.
+const ATTRIBUTE_LIMIT: usize = 1000;
 const DEPTH_LIMIT: usize = 8;
 /// Longest text attribute (bytes).
 const TEXT_LIMIT: usize = 4096;
@@ -143,6 +145,11 @@ impl GuardedFile {
         let prefix = format!("{group}/");
         let inside = self.catalogue.range(prefix.clone()..).take_while(|(path, _)| path.starts_with(&prefix));
         inside.filter_map(|(path, _)| path.strip_prefix(&prefix)).filter(|name| !name.contains('/')).collect()
+    }
+
+    /// Number of objects outside `/VTKHDF`.
+    pub(super) fn object_count(&self) -> usize {
+        self.catalogue.len()
     }
 
     /// Names directly under the root.
@@ -302,7 +309,7 @@ impl GuardedFile {
             let mut seen = 0;
             let found = location.find_attr(IndexType::Name, IterationOrder::Native, |found, _| {
                 seen += 1;
-                if seen > OBJECT_LIMIT { Err("too many attributes".into()) } else { Ok((found == name).then_some(())) }
+                if seen > ATTRIBUTE_LIMIT { Err("more than 1000 attributes".into()) } else { Ok((found == name).then_some(())) }
             });
             found.map_err(unreadable)?.ok_or_else(missing)?;
             location.attr(name).map_err(unreadable)

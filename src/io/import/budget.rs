@@ -9,16 +9,17 @@ const BASE: u64 = 16 << 20;
 /// Bytes per byte of the files; mode shapes of plates, half of whose components are nearly zero, pack about 20 to 1.
 const RATIO: u64 = 64;
 
-/// Bytes that may still be read at once.
+/// Bytes that may be read at once, and bytes that are kept.
 #[derive(Debug)]
 pub(super) struct Budget {
     limit: Cell<u64>,
+    kept: Cell<u64>,
 }
 
 impl Budget {
     /// For a file of that length.
     pub fn new(file_bytes: u64) -> Self {
-        Self { limit: Cell::new(BASE.saturating_add(file_bytes.saturating_mul(RATIO))) }
+        Self { limit: Cell::new(BASE.saturating_add(file_bytes.saturating_mul(RATIO))), kept: Cell::new(0) }
     }
 
     /// More room for a further file.
@@ -28,7 +29,17 @@ impl Budget {
 
     /// Refuses an array that is too large for the files it comes from.
     pub fn check(&self, file: &Path, object: &str, numbers: usize) -> Result<(), ImportError> {
-        let (bytes, limit) = ((numbers as u64).saturating_mul(8), self.limit.get());
+        self.judge(file, object, (numbers as u64).saturating_mul(8))
+    }
+
+    /// As [`Self::check`] for what stays in memory, together with all that was kept before: objects of a file may all be links to one array.
+    pub fn keep(&self, file: &Path, object: &str, numbers: usize) -> Result<(), ImportError> {
+        self.kept.set(self.kept.get().saturating_add((numbers as u64).saturating_mul(8)));
+        self.judge(file, object, self.kept.get())
+    }
+
+    fn judge(&self, file: &Path, object: &str, bytes: u64) -> Result<(), ImportError> {
+        let limit = self.limit.get();
         if bytes <= limit {
             return Ok(());
         }

@@ -5,6 +5,7 @@
 //! weighted mean. Nodes of surface meshes are weighted by the area of whole cells or else the length of edges between them, nodes that have neither
 //! between them all alike.
 
+use super::cell::CellKind;
 use super::element::Element;
 use super::error::{ImportError, listed, refused};
 use super::mesh::{FieldPlace, ForeignModel};
@@ -97,8 +98,14 @@ type Products = BTreeMap<(usize, usize), f64>;
 fn weigh(model: &ForeignModel, selected: &BTreeSet<usize>, outer: &[Facet]) -> (Products, &'static str) {
     let within = |facets: &[Facet]| -> Products {
         let mut products = Products::new();
+        let mut elements: Vec<(CellKind, Element)> = Vec::new();
         for facet in facets.iter().filter(|facet| facet.nodes.iter().all(|node| selected.contains(node))) {
-            let matrix = Element::of(facet.kind).products(&positions(&model.points, &facet.nodes));
+            let known = elements.iter().position(|(kind, _)| *kind == facet.kind);
+            let element = known.unwrap_or_else(|| {
+                elements.push((facet.kind, Element::of(facet.kind)));
+                elements.len() - 1
+            });
+            let matrix = elements[element].1.products(&positions(&model.points, &facet.nodes));
             for (i, &a) in facet.nodes.iter().enumerate() {
                 facet.nodes.iter().enumerate().for_each(|(j, &b)| *products.entry((a, b)).or_default() += matrix[(i, j)]);
             }

@@ -14,6 +14,8 @@ use std::path::{Path, PathBuf};
 
 /// Length of one name in a list of component names (bytes).
 const NAME_BYTES: usize = 16;
+/// What the name of a group takes, in numbers of eight bytes: its 80 bytes and what holds them.
+const GROUP_NAME_NUMBERS: usize = 14;
 /// Where steps lie that cover the whole mesh.
 const NO_PROFILE: &str = "MED_NO_PROFILE_INTERNAL";
 const AGAIN: &str = "export the file again";
@@ -125,9 +127,10 @@ impl Reader {
         Ok(dataset.read_numbers()?)
     }
 
+    /// Nodes of cells, or families: they are kept.
     fn integers(&self, path: &str) -> Result<Vec<i64>, ImportError> {
         let dataset = self.file.foreign(path)?;
-        self.budget.check(&self.path, path, dataset.len())?;
+        self.budget.keep(&self.path, path, dataset.len())?;
         Ok(dataset.read_integers()?)
     }
 
@@ -139,6 +142,7 @@ impl Reader {
         }
         let path = format!("{state}/NOE/COO");
         let values = self.numbers(&path)?;
+        self.budget.keep(&self.path, &path, values.len())?;
         let count = values.len() / 3;
         let stated = self.file.integer(&path, "NBR")?;
         if count == 0 || count > COUNT_LIMIT || values.len() % 3 != 0 || usize::try_from(stated) != Ok(count) {
@@ -203,17 +207,34 @@ impl Reader {
             let names = format!("{path}/GRO/NOM");
             // families without groups are sound
             if self.file.has(&names) {
-                let names = self.file.foreign(&names)?.read_names()?;
+                let dataset = self.file.foreign(&names)?;
+                self.budget.keep(&self.path, &names, dataset.len() * GROUP_NAME_NUMBERS)?;
+                let names = dataset.read_names()?;
                 groups.insert(number, names.into_iter().filter(|name| !name.is_empty()).collect());
             }
         }
         Ok(groups)
     }
 
+    /// The bound on members of groups: few nodes in families of many groups each are many members.
+    fn keep_members<'f>(
+        &self,
+        mesh: &str,
+        side: &str,
+        numbers: usize,
+        groups: &HashMap<i64, Vec<String>>,
+        families: impl Iterator<Item = &'f i64>,
+    ) -> Result<(), ImportError> {
+        let members: usize = families.map(|family| groups.get(family).map_or(0, Vec::len)).fold(0, usize::saturating_add);
+        self.budget.keep(&self.path, &format!("FAS/{mesh}/{side}"), members.saturating_mul(numbers))
+    }
+
     fn node_groups(&self, mesh: &str, state: &str, nodes: usize) -> Result<BTreeMap<String, Vec<usize>>, ImportError> {
         let groups = self.groups_of_families(mesh, "NOEUD")?;
+        let families = self.families(&format!("{state}/NOE/FAM"), nodes)?;
+        self.keep_members(mesh, "NOEUD", 1, &groups, families.iter())?;
         let mut members: BTreeMap<String, Vec<usize>> = BTreeMap::new();
-        for (node, family) in self.families(&format!("{state}/NOE/FAM"), nodes)?.into_iter().enumerate() {
+        for (node, family) in families.into_iter().enumerate() {
             for name in groups.get(&family).into_iter().flatten() {
                 members.entry(name.clone()).or_default().push(node);
             }
@@ -223,6 +244,7 @@ impl Reader {
 
     fn cell_groups(&self, mesh: &str, families: &[Vec<i64>]) -> Result<BTreeMap<String, Vec<(usize, usize)>>, ImportError> {
         let groups = self.groups_of_families(mesh, "ELEME")?;
+        self.keep_members(mesh, "ELEME", 2, &groups, families.iter().flatten())?;
         let mut members: BTreeMap<String, Vec<(usize, usize)>> = BTreeMap::new();
         for (block, families) in families.iter().enumerate() {
             for (cell, family) in families.iter().enumerate() {

@@ -106,7 +106,7 @@ impl ForeignModel {
         let values = self.source.values(field, step)?;
         let rows = match field.place {
             FieldPlace::Node => self.points.len(),
-            FieldPlace::Cell => self.blocks.iter().map(|block| block.cells().len()).sum(),
+            FieldPlace::Cell => self.cell_count(),
         };
         let object = || format!("field \"{}\", step {}", super::error::printable(&field.name), step.number);
         let expected = rows * field.components.len();
@@ -122,6 +122,12 @@ impl ForeignModel {
                 Err(refused(&self.file, object(), found, "finite numbers of magnitude up to 1e100", "repair the export of this field"))
             }
         }
+    }
+
+    /// Number of all cells.
+    #[must_use]
+    pub fn cell_count(&self) -> usize {
+        self.blocks.iter().map(|block| block.cells().len()).sum()
     }
 
     /// Names of the fields, for messages.

@@ -94,6 +94,8 @@ pub(super) fn read(model: &ForeignModel, options: &ImportOptions) -> Result<Mode
         None => None,
         Some(name) => {
             let states = same_length(model, "stress", name, all.len()).map(pick)?;
+            let rows = if states[0].0.place == FieldPlace::Node { model.points.len() } else { model.cell_count() };
+            model.source.budget().check(&model.file, "the stress of all modes", count.saturating_mul(6 * rows))?;
             let columns = stress_columns(model, &states[0].0, options.stress_components.as_deref())?;
             Some((states[0].0.place, gather(model, &states, &columns)?))
         }

@@ -10,7 +10,8 @@ use super::mesh::{COUNT_LIMIT, CellBlock, Field, FieldPlace, FieldSource, FieldS
 use super::xdmf_item::{Folder, Item};
 use super::xml::{self, Document, Element};
 use nalgebra::Vector3;
-use std::collections::BTreeMap;
+use std::cell::RefCell;
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
 /// Reads an XDMF file.
@@ -39,6 +40,18 @@ struct Reader {
     folder: Folder,
     document: Document,
 }
+
+/// Grids by name and by place below a named grid. Every step may point at one; a search for each would take as long as the square of the
+/// file's length.
+struct Grids<'d> {
+    by_name: HashMap<&'d str, &'d Element>,
+    below: RefCell<HashMap<&'d str, Vec<&'d Element>>>,
+    /// Topology and geometry of the grids that were pointed at.
+    meshes: RefCell<HashMap<*const Element, Option<Mesh<'d>>>>,
+}
+
+/// Topology and geometry.
+type Mesh<'d> = (&'d Element, &'d Element);
 
 /// Numbers of fields by the place of their item.
 #[derive(Debug)]
@@ -95,14 +108,17 @@ impl Reader {
         let Some(first) = steps.first() else {
             return self.refuse("Grid", "a collection without grids", "one grid per mode", "export the modes as steps");
         };
-        let (topology, geometry) = self.mesh_of(first)?;
+        let grids = self.grids();
+        let (topology, geometry) = self.mesh_of(first, &grids)?;
+        // each mesh is compared once, however many steps point at it
+        let mut compared = HashSet::new();
         for step in &steps[1..] {
             // a step may leave the mesh out, refer to it, or repeat it; another mesh would give the fields other nodes
             if !self.document.children(step).any(|child| matches!(child.name.as_str(), "Topology" | "Geometry" | "include")) {
                 continue;
             }
-            let (other, points) = self.mesh_of(step)?;
-            if !(self.same(other, topology) && self.same(points, geometry)) {
+            let (other, points) = self.mesh_of(step, &grids)?;
+            if compared.insert(std::ptr::from_ref(other)) && !(self.same(other, topology) && self.same(points, geometry)) {
                 return self.refuse("Topology", "another mesh in a later step", "one mesh for all modes", "export the modes on one mesh");
             }
         }
@@ -130,8 +146,18 @@ impl Reader {
         }
     }
 
+    fn grids(&self) -> Grids<'_> {
+        let mut by_name = HashMap::new();
+        for grid in self.document.named("Grid") {
+            if let Some(name) = grid.attribute("Name") {
+                by_name.entry(name).or_insert(grid);
+            }
+        }
+        Grids { by_name, below: RefCell::default(), meshes: RefCell::default() }
+    }
+
     /// Topology and geometry of a grid, or of the grid that it includes.
-    fn mesh_of<'d>(&'d self, grid: &'d Element) -> Result<(&'d Element, &'d Element), ImportError> {
+    fn mesh_of<'d>(&'d self, grid: &'d Element, grids: &Grids<'d>) -> Result<Mesh<'d>, ImportError> {
         let own = |grid: &'d Element| Some((self.document.below(grid, "Topology").next()?, self.document.below(grid, "Geometry").next()?));
         if let Some(mesh) = own(grid) {
             return Ok(mesh);
@@ -153,7 +179,8 @@ impl Reader {
             );
         }
         let pointer = include.attribute("xpointer").unwrap_or_default();
-        let target = self.pointed(pointer).and_then(own);
+        let target = self.pointed(pointer, grids);
+        let target = target.and_then(|grid| *grids.meshes.borrow_mut().entry(std::ptr::from_ref(grid)).or_insert_with(|| own(grid)));
         target.map_or_else(
             || {
                 let found = format!("the pointer \"{}\"", printable(pointer));
@@ -165,16 +192,18 @@ impl Reader {
     }
 
     /// The grid named by a pointer, or the numbered one below it.
-    fn pointed<'d>(&'d self, pointer: &str) -> Option<&'d Element> {
+    fn pointed<'d>(&'d self, pointer: &str, grids: &Grids<'d>) -> Option<&'d Element> {
         let (_, rest) = pointer.split_once("//Grid[@Name=")?;
         let quote = rest.chars().next().filter(|c| matches!(c, '"' | '\''))?;
         let (name, rest) = rest[1..].split_once(quote)?;
-        let grid = self.document.named("Grid").find(|grid| grid.attribute("Name") == Some(name))?;
+        let (&name, &grid) = grids.by_name.get_key_value(name)?;
         match rest.split_once("/Grid[") {
             None => Some(grid),
             Some((_, number)) => {
                 let number: usize = number.split_once(']')?.0.parse().ok()?;
-                self.document.below(grid, "Grid").nth(number.checked_sub(1)?)
+                let mut below = grids.below.borrow_mut();
+                let children = below.entry(name).or_insert_with(|| self.document.below(grid, "Grid").collect());
+                children.get(number.checked_sub(1)?).copied()
             }
         }
     }

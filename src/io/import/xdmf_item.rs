@@ -3,9 +3,9 @@
 use super::budget::Budget;
 use super::error::{ImportError, printable, refused};
 use super::xml::Element;
-use crate::io::guard::GuardedFile;
-use std::cell::RefCell;
-use std::collections::HashMap;
+use crate::io::guard::{GuardedFile, OBJECT_LIMIT};
+use std::cell::{Cell, RefCell};
+use std::collections::{BTreeSet, HashMap};
 use std::path::{Component, Path, PathBuf};
 use std::rc::Rc;
 
@@ -44,6 +44,8 @@ impl Item {
 pub(super) struct Folder {
     xdmf: PathBuf,
     open: RefCell<HashMap<String, Rc<GuardedFile>>>,
+    /// Groups and datasets of all of them.
+    objects: Cell<usize>,
     /// The bound on what is read, for all files together.
     pub budget: Budget,
 }
@@ -51,7 +53,7 @@ pub(super) struct Folder {
 impl Folder {
     /// The folder of the file `xdmf` of that length.
     pub fn of(xdmf: &Path, bytes: u64) -> Self {
-        Self { xdmf: xdmf.to_owned(), open: RefCell::default(), budget: Budget::new(bytes) }
+        Self { xdmf: xdmf.to_owned(), open: RefCell::default(), objects: Cell::new(0), budget: Budget::new(bytes) }
     }
 
     /// The XDMF file.
@@ -61,7 +63,8 @@ impl Folder {
 
     /// The XDMF file and the HDF5 files opened so far.
     pub fn files(&self) -> Vec<PathBuf> {
-        self.open.borrow().values().map(|file| file.path().to_owned()).chain([self.xdmf.clone()]).collect()
+        let files: BTreeSet<PathBuf> = self.open.borrow().values().map(|file| file.path().to_owned()).collect();
+        files.into_iter().chain([self.xdmf.clone()]).collect()
     }
 
     /// Understands a DataItem; `object` says whose it is.
@@ -192,8 +195,9 @@ impl Folder {
             _ => Path::new("."),
         };
         let path = folder.join(relative);
+        let real = path.canonicalize();
         // a link may lead elsewhere although its name does not
-        let inside = match (folder.canonicalize(), path.canonicalize()) {
+        let inside = match (folder.canonicalize(), &real) {
             (Ok(folder), Ok(target)) => target.starts_with(folder),
             // what is not there is said by the system below
             _ => true,
@@ -201,7 +205,23 @@ impl Folder {
         if !inside {
             return Err(outside());
         }
+        // a file under another name gives no more room and costs no more time
+        let known = real
+            .ok()
+            .and_then(|real| self.open.borrow().values().find(|file| file.path().canonicalize().is_ok_and(|p| p == real)).cloned());
+        if let Some(file) = known {
+            self.open.borrow_mut().insert(name.to_owned(), file.clone());
+            return Ok(file);
+        }
         let file = Rc::new(GuardedFile::open(&path)?);
+        // listing takes time: what one file may cost, all of them together may
+        let objects = self.objects.get() + file.object_count();
+        self.objects.set(objects);
+        if objects > OBJECT_LIMIT {
+            let found = format!("{objects} objects in the HDF5 files up to {}", printable(name));
+            let expected = format!("at most {OBJECT_LIMIT}");
+            return Err(refused(&self.xdmf, &item.object, found, expected, "leave what is no mode out of the HDF5 files"));
+        }
         self.budget.extend(file.bytes());
         self.open.borrow_mut().insert(name.to_owned(), file.clone());
         Ok(file)
