@@ -36,10 +36,15 @@ impl Failure {
         let mut sink = io::stderr().lock();
         for message in messages {
             // nothing is left to tell anyone if standard error is closed too
-            let _ = writeln!(sink, "error: {message}");
+            let _ = writeln!(sink, "error: {}", printable(&message));
         }
         ExitCode::from(code)
     }
+}
+
+/// A message without what a terminal would obey: lines of a file are shown in it.
+fn printable(message: &str) -> String {
+    message.chars().map(|c| if c.is_control() && !matches!(c, '\n' | '\t') { char::REPLACEMENT_CHARACTER } else { c }).collect()
 }
 
 impl From<io::Error> for Failure {

@@ -58,6 +58,7 @@ pub(super) struct Table<'r> {
     pub blocks: Vec<Block<'r>>,
     pub rows: usize,
     /// Name of the scene.
+    #[cfg(feature = "parquet")]
     pub scene: &'r str,
 }
 
@@ -65,7 +66,12 @@ impl<'r> Table<'r> {
     fn of(results: &'r ResultsReader) -> Result<Self, ExportError> {
         let block = |series: &Series| Ok(Block { names: names(series), column: results.column(&series.path, series.width)? });
         let blocks = results.series.iter().map(block).collect::<Result<_, ExportError>>()?;
-        Ok(Self { blocks, rows: results.rows, scene: &results.scene_name })
+        Ok(Self {
+            blocks,
+            rows: results.rows,
+            #[cfg(feature = "parquet")]
+            scene: &results.scene_name,
+        })
     }
 }
 
