@@ -73,6 +73,18 @@ def test_a_missing_environment_is_named_with_the_script_that_makes_it(tmp_path, 
         nastran.read(tmp_path / "a.bdf", tmp_path / "a.op2")
 
 
+def test_what_pynastran_cannot_read_is_said_in_its_own_words(tmp_path, monkeypatch):
+    for name in ("a.bdf", "a.op2"):
+        (tmp_path / name).write_text("")
+    interpreter = tmp_path / "python"
+    interpreter.write_text("#!/bin/sh\necho 'RuntimeError: CARD 7 is odd' >&2\nexit 1\n")
+    interpreter.chmod(0o755)
+    monkeypatch.setattr(nastran, "python", lambda: interpreter)
+    with pytest.raises(InputError) as refusal:
+        nastran.read(tmp_path / "a.bdf", tmp_path / "a.op2")
+    assert str(refusal.value) == f"{tmp_path / 'a.bdf'}: pyNastran: found RuntimeError: CARD 7 is odd, expected a model that it reads; look at the cards it names"
+
+
 def square(**change):
     """Four nodes at the root, four outboard, one mode."""
     points = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 0.1)])
@@ -87,12 +99,19 @@ def square(**change):
     ({"node_mass": np.zeros(8)}, "model.npz: nodal masses: found a sum of 0, expected a positive mass; check densities and masses in the model"),
     ({"node_inertia": np.ones((8, 6))}, "model.npz: rotations: found none, but nodes with inertia of their own, expected rotations of every node; export all six components of the modes"),
     ({"displacement": np.zeros((0, 8, 3)), "frequency": np.zeros(0)}, "model.npz: modes: found none, expected at least one; export the modes from the code; a body without them is rigid"),
-    ({"node_mass": np.array([1, 1, 1, 1, 0, 0, 0, 0.0])}, "mode 1: no mass moves in it; check the nodal masses and the node numbers"),
+    ({"node_mass": np.array([1, 1, 1, 1, 0, 0, 0, 0.0])}, "model.npz: modes and masses: found modes that are not orthogonal, expected those of one model; mode 1: no mass moves in it; check the nodal masses and the node numbers"),
 ])
 def test_masses_and_modes_that_do_not_make_a_body_are_refused(change, message):
     with pytest.raises(InputError) as refusal:
         assemble.compute(square(**change), CHOICES)
     assert message in str(refusal.value)
+
+
+def test_an_interface_of_nodes_in_line_is_refused():
+    choices = Choices("1-4", {"edge": "5-6"}, "cantilever", [0.0], 1.0, 1.0)
+    with pytest.raises(InputError) as refusal:
+        assemble.compute(square(), choices)
+    assert "found 2 nodes, expected a face; " in str(refusal.value)
 
 
 def test_modes_of_rigid_motion_alone_are_refused():
