@@ -16,3 +16,5 @@ step .venv/bin/python scripts/count_instructions.py
 # the core alone, without modal files and viewer
 step cargo check --release --locked --no-default-features --lib --bins
 step .venv/bin/python -m pytest -q tests/python
+# a minute of damaged input for the readers
+step scripts/fuzz.sh

@@ -57,6 +57,21 @@ fn the_command_ends_with_code_2_and_one_message() {
         &["import", "beam.xdmf", "--out", out, "--boundary", "glued"],
         &["boundary: \"glued\" must be cantilever, free-free, craig-bampton or general"],
     );
+    let keyed = |text: &str| {
+        let keys = folder.path().join("keys.toml");
+        std::fs::write(&keys, text).unwrap();
+        keys.to_str().unwrap().to_owned()
+    };
+    let keys = keyed("interface.tip.box = [[1.0, 0.0, 0.0], [0.0, 0.0, 0.0]]");
+    said(
+        &["import", "beam.xdmf", "--out", out, "--keys", &keys],
+        &["beam.xdmf: interface: \"tip\": box = [low, high] needs low at most high along every axis"],
+    );
+    let keys = keyed("interface.tip = { group = \"TIP\", coupling = \"glue\" }");
+    said(&["import", "beam.xdmf", "--out", out, "--keys", &keys], &["interface: \"tip\": coupling \"glue\" must be rbe3 or rbe2"]);
+    // a line of the file is shown, but nothing of it that a terminal would obey
+    let keys = keyed("title = \u{1b}[2J");
+    said(&["import", "beam.xdmf", "--out", out, "--keys", &keys], &["title = \u{fffd}[2J"]);
     for name in ["beam.xdmf", "beam.h5"] {
         std::fs::copy(data(name), folder.path().join(name)).unwrap();
     }

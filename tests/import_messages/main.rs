@@ -1,6 +1,8 @@
 //! Every refusal of an import names the file, the object, what was found, what was expected and what to do; exit code 2.
 #![cfg(feature = "hdf5")]
 
+mod whole_texts;
+
 use hdf5::File;
 use pliant::io::import::import_to;
 use pliant::scene::import_spec::ImportSpec;

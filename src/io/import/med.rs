@@ -151,7 +151,9 @@ impl Reader {
         }
         match values.iter().position(|v| !(v.abs() <= 1e100)) {
             None => Ok(by_rows(&values, 3).chunks_exact(3).map(Vector3::from_column_slice).collect()),
-            Some(at) => self.refuse(&path, format!("{} at node {}", values[at], at % count + 1), "finite coordinates", "repair the export"),
+            Some(at) => {
+                self.refuse(&path, format!("{:e} at node {}", values[at], at % count + 1), "finite coordinates", "repair the export")
+            }
         }
     }
 

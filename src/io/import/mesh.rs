@@ -118,7 +118,7 @@ impl ForeignModel {
         match values.iter().position(|v| !(v.abs() <= 1e100)) {
             None => Ok(values),
             Some(at) => {
-                let found = format!("{} at flat index {at}", values[at]);
+                let found = format!("{:e} at flat index {at}", values[at]);
                 Err(refused(&self.file, object(), found, "finite numbers of magnitude up to 1e100", "repair the export of this field"))
             }
         }

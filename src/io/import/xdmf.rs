@@ -239,7 +239,7 @@ impl Reader {
         let values = self.folder.numbers(&item)?;
         match values.iter().position(|v| !(v.abs() <= 1e100)) {
             None => Ok(values.chunks_exact(3).map(Vector3::from_column_slice).collect()),
-            Some(at) => self.refuse(OBJECT, format!("{} at node {}", values[at], at / 3), "finite coordinates", "repair the export"),
+            Some(at) => self.refuse(OBJECT, format!("{:e} at node {}", values[at], at / 3), "finite coordinates", "repair the export"),
         }
     }
 
