@@ -2,7 +2,6 @@
 //!
 //! An array is written as soon as it is known and not kept, so memory holds one field of one time.
 
-use hdf5::file::MetadataCacheConfig;
 use hdf5::types::H5Type;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -11,8 +10,6 @@ use thiserror::Error;
 const CHUNK_ROWS: usize = 1 << 14;
 /// Smaller arrays stay contiguous (bytes): a chunk index would be larger than what it saves.
 const COMPRESS_ABOVE: usize = 4096;
-/// What libhdf5 may keep of the descriptions of arrays (bytes): each is written once and not looked at again, and its own choice is 32 MiB.
-const CACHE: usize = 2 << 20;
 
 /// Why an array file is not, or no longer, written.
 #[derive(Debug, Error, Clone, PartialEq, Eq)]
@@ -42,8 +39,7 @@ impl FieldFile {
         // the system's own words are clearer than those of libhdf5
         std::fs::OpenOptions::new().write(true).create(true).truncate(false).open(path).map_err(|e| fail(e.to_string()))?;
         hdf5::silence_errors(true);
-        let cache = MetadataCacheConfig { initial_size: CACHE, max_size: CACHE, ..MetadataCacheConfig::default() };
-        let file = hdf5::File::with_options().with_fapl(|list| list.mdc_config(&cache)).create(path).map_err(|e| fail(e.to_string()))?;
+        let file = hdf5::File::create(path).map_err(|e| fail(e.to_string()))?;
         Ok(Self { path: path.to_owned(), file, bytes: 0 })
     }
 

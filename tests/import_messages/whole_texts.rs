@@ -389,40 +389,40 @@ fn med_files() {
         f.unlink(&nodes).unwrap();
         f.new_dataset::<f64>().shape(4).create(nodes.as_str()).unwrap().write_raw(&[0.0; 4]).unwrap();
     };
-    said(&retyped, &format!("found the type real numbers, expected integers{remedy}"));
+    said(&retyped, &format!("found real numbers, expected integers{remedy}"));
     let named = |f: &File| {
         f.unlink(&nodes).unwrap();
         f.new_dataset::<[i8; 80]>().shape(4).create(nodes.as_str()).unwrap().write_raw(&[[65_i8; 80]; 4]).unwrap();
     };
-    said(&named, &format!("found the type names, expected integers{remedy}"));
+    said(&named, &format!("found names, expected integers{remedy}"));
     let logical = |f: &File| {
         f.unlink(&nodes).unwrap();
         f.new_dataset::<bool>().shape(4).create(nodes.as_str()).unwrap().write_raw(&[true; 4]).unwrap();
     };
     said(
         &logical,
-        &format!("found the type a boolean (an enumeration), expected little-endian real numbers, integers or names of 80 bytes{remedy}"),
+        &format!("found a boolean (an enumeration), expected little-endian real numbers, integers or names of 80 bytes{remedy}"),
     );
     let coordinates = format!("{STATE}/NOE/COO");
     let lettered = |f: &File| {
         f.unlink(&coordinates).unwrap();
         f.new_dataset::<[i8; 80]>().shape(4).create(coordinates.as_str()).unwrap().write_raw(&[[65_i8; 80]; 4]).unwrap();
     };
-    said(&lettered, &format!("found the type names, expected numbers{remedy}"));
+    said(&lettered, &format!("found names, expected numbers{remedy}"));
     // attributes
     let real = |f: &File| replace(f, STEP, "NDT").new_attr::<f64>().create("NDT").unwrap().write_scalar(&1.0).unwrap();
-    said(&real, &format!("@NDT: found the type f8, expected an integer{remedy}"));
+    said(&real, &format!("@NDT: found f8, expected an integer{remedy}"));
     let whole = |f: &File| replace(f, STEP, "PDT").new_attr::<i32>().create("PDT").unwrap().write_scalar(&1).unwrap();
-    said(&whole, &format!("@PDT: found the type i4, expected a real number (f8){remedy}"));
+    said(&whole, &format!("@PDT: found i4, expected a real number (f8){remedy}"));
     let endless = |f: &File| f.group(STEP).unwrap().attr("PDT").unwrap().write_scalar(&f64::NAN).unwrap();
-    said(&endless, &format!("@PDT: found the type NaN, expected a finite number{remedy}"));
+    said(&endless, &format!("@PDT: found NaN, expected a finite number{remedy}"));
     let two = |f: &File| replace(f, STEP, "NDT").new_attr::<i32>().shape(2).create("NDT").unwrap().write_raw(&[1, 2]).unwrap();
     said(&two, "@NDT: found shape (2), expected a single value; export the file again");
     let controls = |f: &File| {
         let text = hdf5::types::FixedAscii::<16>::from_ascii(b"bo\x1bdy").unwrap();
         replace(f, "CHA/MODES___DEPL", "MAI").new_attr::<hdf5::types::FixedAscii<16>>().create("MAI").unwrap().write_scalar(&text).unwrap();
     };
-    said(&controls, &format!("@MAI: found the type a text with control characters, expected a printable text{remedy}"));
+    said(&controls, &format!("@MAI: found a text with control characters, expected a printable text{remedy}"));
     said(
         &|f| f.create_group("CHA/be\u{7}ll").map(drop).unwrap(),
         "CHA: found an object named \"be\\u{7}ll\", expected printable names; rename the object",
@@ -435,7 +435,7 @@ fn med_files() {
         f.unlink(&nodes).unwrap();
         f.create_group(&nodes).unwrap();
     };
-    said(&group, &format!("found the type a group, expected a dataset{remedy}"));
+    said(&group, &format!("found a group, expected a dataset{remedy}"));
 }
 
 #[test]
