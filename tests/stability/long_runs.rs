@@ -48,7 +48,6 @@ fn a_million_periods_lose_what_the_method_says() {
 }
 
 #[test]
-#[ignore = "a minute"]
 fn a_million_periods_of_a_hundred_steps_lose_what_the_method_says() {
     let (logarithm, phase) = after(1e6, 0.01);
     assert_rows(&[

@@ -206,7 +206,6 @@ fn order_8_spends_fewer_steps_on_a_spin_of_1e4_rad_per_s() {
 
 /// 2.4e8 evaluations.
 #[test]
-#[ignore = "three minutes"]
 fn a_thousand_seconds_of_spin_at_1e4_rad_per_s() {
     long_spin(1000.0, 20_000_000, &AFTER_1000, Some(RATES_AFTER_1000));
 }
