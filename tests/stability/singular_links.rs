@@ -1,7 +1,8 @@
 //! Links without mass or inertia, hinges whose inertia vanishes, and gimbal lock (S03 to S05).
 
+use crate::order_8;
 use crate::row::{EPS, Row, assert_rows};
-use crate::support::scenes::{Z, chain, difference, dormand_prince, end_of, hinge, rigid, rk4};
+use crate::support::scenes::{Z, chain, difference, dormand_prince, hinge, rigid, rk4};
 use nalgebra::Vector3;
 use pliant::dynamics::{DynamicsError, Workspace, forward_dynamics};
 use pliant::integrate::simulate::Method;
@@ -212,19 +213,20 @@ fn a_run_into_gimbal_lock_names_the_hinge() {
     assert_rows(&rows);
 }
 
-/// S05 with R05: the angular velocity in body axes is the same from every attitude.
+/// S05 with R05: the angular velocity in body axes is the same from every attitude. Few fixed steps make the same error from all of them; steps
+/// that an error estimate chooses differ by its rounding.
 #[test]
 fn a_spherical_hinge_does_not_know_gimbal_lock() {
     let expected = [-0.999_964_488_599_380_366, 0.013_077_520_413_042_319_8, 0.577_387_500_863_391_946];
     let ends = [[0.0; 3], [0.0, FRAC_PI_2, 0.0], [3.1, 0.0, 0.0], [1.0, -2.0, 1.5]].map(|attitude| {
         let position = quaternion_of_vector(&Vector3::from(attitude)).to_vec();
         let (system, start) = dish("spherical", [1.0, 2.0, 3.0], position, vec![0.01, 1.0, 0.01]);
-        end_of(&system, &start, dormand_prince(1e-12), 50.0).velocity
+        order_8::run(&system, &start, 50.0, 1000, 1000, |_| {}).velocity
     });
     let off = |reference: &[f64]| ends.iter().map(|end| difference(end, reference)).fold(0.0, f64::max);
-    // a flip multiplies what was rounded before it by 100, the inverse of the small rates that it starts from
+    // flips multiply what was rounded before them by 100 each, the inverse of the small rates that they start from
     assert_rows(&[
-        Row::at_most("S05", "Euler's top on a spherical hinge from four attitudes, 50 s: angular velocity", off(&expected), 1e-9, ""),
+        Row::at_most("S05", "Euler's top on a spherical hinge from four attitudes, 50 s: angular velocity", off(&expected), 1e-10, ""),
         Row::at_most("S05", "the same: one attitude against another", off(&ends[0]), 1e-10, ""),
     ]);
 }
