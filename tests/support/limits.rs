@@ -19,6 +19,8 @@ pub fn run_within<S: AsRef<OsStr>>(arguments: &[S], address_space_kib: u64) -> O
     } else {
         Command::new(program)
     };
+    // a program that another test starts meanwhile may hold, and keep locked, what this process has open
+    command.env("HDF5_USE_FILE_LOCKING", "FALSE");
     let mut child = command.args(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     let start = Instant::now();
     while child.try_wait().unwrap().is_none() {
