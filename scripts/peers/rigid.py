@@ -124,14 +124,14 @@ def ratio(ours, theirs):
 
 
 def table(log, names):
-    """Markdown: ns per body of pliant, and its time over that of each of `names`."""
-    head = ["system", "bodies", "op", "pliant (ns per body)", *(f"pliant / {name}" for name in names)]
+    """Markdown: ns per body of pliant, its time with loads over that without, and its time over that of each of `names`."""
+    head = ["system", "bodies", "op", "pliant (ns per body)", "with loads / without", *(f"pliant / {name}" for name in names)]
     lines = [head, ["---"] * len(head)]
     for (model, n), rows in log.items():
         for op, what in (("fd", "accelerations"), ("fdf", "and all hinge loads")):
             ours = rows["pliant", op]
             row = [f"{model} of {n}" if model == "chain" else f"hub and 4 arms of {n}", f"{bodies(model, n):,}", what,
-                   f"{min(ours.ns) / bodies(model, n):.0f}"]
+                   f"{min(ours.ns) / bodies(model, n):.0f}", "{:.3f} ({:.3f} to {:.3f})".format(*ratio(ours, rows["pliant", "fd"])) if op == "fdf" else ""]
             for name in names:
                 theirs = rows.get((name, op))
                 row.append("{:.2f} ({:.2f} to {:.2f})".format(*ratio(ours, theirs)) if theirs else "")

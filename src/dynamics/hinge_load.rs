@@ -24,6 +24,7 @@ pub fn hinge_load_on_parent(workspace: &Workspace, k: usize) -> Vector6<f64> {
 }
 
 /// Loads at all hinges, one per body: those that the evaluation left, or, where it left none, those made in `room`, which has one entry per body.
+#[inline]
 pub fn hinge_loads<'a>(workspace: &'a Workspace, room: &'a mut [Vector6<f64>]) -> &'a [Vector6<f64>] {
     match workspace.kernel().map(TreeKernel::hinge_loads) {
         Some(loads) if loads.len() == room.len() => loads,

@@ -1,6 +1,6 @@
 //! Third pass: accelerations and hinge loads, from the base to the tips. Source: Paper Eq. 13 and 18, in inertial axes.
 
-use super::layout::{Axes, Passage, Shape};
+use super::layout::{Passage, Shape};
 use super::record::{Motion, Outboard, block};
 use super::{Branch, NONE, TreeKernel, arm, parent_motion};
 use crate::dynamics::sweep::force_inward::world_acceleration;
@@ -15,18 +15,31 @@ const FAR: usize = 8 << 20;
 /// How many bodies ahead those are asked for.
 const AHEAD: usize = 8;
 
-/// Fills `hinge` with the accelerations of the hinge rates, and the loads where there is room for them.
+/// Fills `hinge` with the accelerations of the hinge rates, and the loads if `LOADS`.
 #[inline(always)]
-pub fn accelerate<L: Lanes>(s: L, tree: &mut TreeKernel, system: &System, state: &State, hinge: &mut [f64], modal: &mut [f64]) {
+pub fn accelerate<L: Lanes, const LOADS: bool>(
+    s: L,
+    tree: &mut TreeKernel,
+    system: &System,
+    state: &State,
+    hinge: &mut [f64],
+    modal: &mut [f64],
+) {
     let TreeKernel { layout, motion, gains, outboard, loads, branches, general, flexible, modal_shapes, .. } = tree;
     let world = world_acceleration(system);
     let at_world = (s.of_three([world[0], world[1], world[2]]), s.of_three([world[3], world[4], world[5]]));
     let mut last = NONE;
     let (mut angular, mut linear) = at_world;
     let is_far = size_of_val(outboard.as_slice()) > FAR;
-    let mut records = outboard.iter().zip(loads.iter_mut());
-    for (k, link) in layout.links.iter().enumerate() {
-        if let Some(&(body, tip)) = layout.tips.get(link.tip as usize) {
+    // slices of one length need no check of an index in the loop
+    let n = layout.links.len();
+    let (links, motion, gains) = (&layout.links[..n], &motion[..n], &gains[..n]);
+    let (outboard, loads) = if LOADS { (&outboard[..n], &mut loads[..n]) } else { (&outboard[..0], &mut loads[..0]) };
+    for k in 0..n {
+        let link = &links[k];
+        if link.is_plain {
+            // its parent came just before
+        } else if let Some(&(body, tip)) = layout.tips.get(link.tip as usize) {
             let a = &flexible[body as usize].tips[tip as usize].acceleration;
             (angular, linear) = (s.of_three([a[0], a[1], a[2]]), s.of_three([a[3], a[4], a[5]]));
         } else if link.parent != last {
@@ -36,8 +49,10 @@ pub fn accelerate<L: Lanes>(s: L, tree: &mut TreeKernel, system: &System, state:
             };
         }
         let shape = &layout.shapes[link.shape as usize];
-        let record = records.next();
-        if is_far && let Some(next) = outboard.get(k + AHEAD) {
+        if LOADS
+            && is_far
+            && let Some(next) = outboard.get(k + AHEAD)
+        {
             s.fetch(next);
         }
         if link.passage != Passage::General {
@@ -46,8 +61,8 @@ pub fn accelerate<L: Lanes>(s: L, tree: &mut TreeKernel, system: &System, state:
             let at = arm(s, link, shape, state, turn, omega, axis);
             // alpha+ = phi* alpha of the parent
             linear = s.sub(linear, s.cross(at.l, angular));
-            if let Some((felt, load)) = record {
-                write_load(s, felt, &motion[k], shape, [angular, linear], load);
+            if LOADS {
+                write_load(s, &outboard[k], &motion[k], shape, [angular, linear], &mut loads[k]);
             }
             (angular, linear) = (s.add(angular, at.angular), s.add(linear, at.linear));
             if link.passage != Passage::Fixed {
@@ -65,13 +80,17 @@ pub fn accelerate<L: Lanes>(s: L, tree: &mut TreeKernel, system: &System, state:
         } else {
             let own = &general[link.general as usize];
             linear = s.sub(linear, s.cross(s.of_three(own.l.into()), angular));
-            if let Some((felt, load)) = record {
-                write_load(s, felt, &motion[k], shape, [angular, linear], load);
+            if LOADS {
+                write_load(s, &outboard[k], &motion[k], shape, [angular, linear], &mut loads[k]);
             }
             let rates = system.bodies[k].velocity_range();
             let outer = spatial(&Vector3::from(s.three(angular)), &Vector3::from(s.three(linear)));
             let alpha = own.accelerate(system, &outer, &mut hinge[rates]);
             (angular, linear) = (s.of_three([alpha[0], alpha[1], alpha[2]]), s.of_three([alpha[3], alpha[4], alpha[5]]));
+        }
+        last = u32::try_from(k).unwrap_or(NONE);
+        if link.is_plain {
+            continue;
         }
         if let Some(own) = flexible.get_mut(link.flexible as usize) {
             let constants = &modal_shapes[own.shape];
@@ -81,7 +100,6 @@ pub fn accelerate<L: Lanes>(s: L, tree: &mut TreeKernel, system: &System, state:
             let (a, b) = (s.three(angular), s.three(linear));
             branch.acceleration = [a[0], a[1], a[2], b[0], b[1], b[2]];
         }
-        last = u32::try_from(k).unwrap_or(NONE);
     }
 }
 
@@ -89,18 +107,16 @@ pub fn accelerate<L: Lanes>(s: L, tree: &mut TreeKernel, system: &System, state:
 #[inline(always)]
 fn write_load<L: Lanes>(s: L, felt: &Outboard, motion: &Motion, shape: &Shape, [angular, linear]: [L::V; 2], load: &mut Vector6<f64>) {
     let [moment, force] = felt.inertia(s).times_add(s, angular, linear, felt.wrench(s));
-    let [x, y, z] = block(s, &motion.turn);
-    // a table of jumps, which a match would become, is foreseen less well than these two
-    let axes = if shape.axes == Axes::Same {
-        [x, y, z]
-    } else if shape.axes == Axes::Next {
-        [y, z, x]
+    let (axes, t) = (&motion.turn, &shape.turn);
+    // places to load from, not branches: those would take the room in which the processor remembers the ends of arms
+    let axes = if let Some([x, y, z]) = shape.order {
+        [s.load(axes[usize::from(x)]), s.load(axes[usize::from(y)]), s.load(axes[usize::from(z)])]
     } else {
-        let t = &shape.turn;
+        let axes = block(s, axes);
         [
-            s.combine_numbers([x, y, z], [t[0], t[3], t[6]]),
-            s.combine_numbers([x, y, z], [t[1], t[4], t[7]]),
-            s.combine_numbers([x, y, z], [t[2], t[5], t[8]]),
+            s.combine_numbers(axes, [t[0], t[3], t[6]]),
+            s.combine_numbers(axes, [t[1], t[4], t[7]]),
+            s.combine_numbers(axes, [t[2], t[5], t[8]]),
         ]
     };
     let moments = [s.mul(axes[0], moment), s.mul(axes[1], moment), s.mul(axes[2], moment)];

@@ -1,6 +1,6 @@
 //! Second pass: articulated inertias and residual forces, from the tips to the base. Source: Paper Eq. 9 to 12, in inertial axes.
 
-use super::cyclic::{Inertia, Turns, general_product, symmetric_product, symmetric_times, transposed_times};
+use super::cyclic::{Inertia, Turns, general_product, square, symmetric_product, symmetric_times, transposed_times};
 use super::hinge::external_force;
 use super::layout::{Passage, Shape};
 use super::record::{Gain, Outboard, block};
@@ -22,14 +22,18 @@ pub struct Felt<V> {
 
 /// Fills the gains, and what loads are made of.
 #[inline(always)]
-pub fn inward<L: Lanes>(s: L, tree: &mut TreeKernel, system: &System, state: &State) -> Result<(), Doubtful> {
+pub fn inward<L: Lanes, const LOADS: bool>(s: L, tree: &mut TreeKernel, system: &System, state: &State) -> Result<(), Doubtful> {
     let TreeKernel { layout, motion, gains, outboard, branches, general, flexible, modal_shapes, external, .. } = tree;
     for branch in branches.iter_mut() {
         branch.felt = Outboard::default();
     }
     let mut felt = Felt::none(s);
-    let mut records = outboard.iter_mut().rev();
-    for (k, link) in layout.links.iter().enumerate().rev() {
+    // slices of one length need no check of an index in the loop
+    let n = layout.links.len();
+    let (links, motion, gains) = (&layout.links[..n], &motion[..n], &mut gains[..n]);
+    let outboard = if LOADS { &mut outboard[..n] } else { &mut outboard[..0] };
+    for k in (0..n).rev() {
+        let link = &links[k];
         let shape = &layout.shapes[link.shape as usize];
         let (turn, omega) = (block(s, &motion[k].turn), s.load(motion[k].omega));
         if let Some(branch) = branches.get(link.branch as usize) {
@@ -64,8 +68,8 @@ pub fn inward<L: Lanes>(s: L, tree: &mut TreeKernel, system: &System, state: &St
             }
             at.l
         };
-        if let Some(out) = records.next() {
-            *out = felt.stored(s);
+        if LOADS {
+            outboard[k] = felt.stored(s);
         }
         felt.shift(s, l);
         if let Some(&(body, tip)) = layout.tips.get(link.tip as usize) {
@@ -118,11 +122,13 @@ impl<V: Copy> Felt<V> {
         // P H*, D and its inverse
         let angular = symmetric_times(s, self.inertia.rotational, axis);
         let linear = transposed_times(s, self.inertia.coupling, axis);
-        let pivot = s.dot(axis, angular);
-        if !(pivot > SINGULAR * s.sum(self.inertia.rotational[0]) && pivot >= f64::MIN_POSITIVE) {
+        let pivot = square(s, self.inertia.rotational, axis);
+        let size = s.first(pivot);
+        if !(size > SINGULAR * s.sum(self.inertia.rotational[0]) && size >= f64::MIN_POSITIVE) {
             return Err(Doubtful);
         }
-        Ok(self.pass(s, [angular, linear], 1.0 / pivot, applied - s.dot(axis, self.moment), at))
+        let epsilon = s.sub(s.splat(applied), s.total(s.mul(axis, self.moment)));
+        Ok(self.pass(s, [angular, linear], s.inverse(pivot), epsilon, at))
     }
 
     /// The same through a hinge that travels along `axis`, and turns about it or not.
@@ -137,20 +143,19 @@ impl<V: Copy> Felt<V> {
             return Err(Doubtful);
         }
         let epsilon = applied - s.dot_two(turn, self.moment, travel, self.force);
-        Ok(self.pass(s, [angular, linear], 1.0 / pivot, epsilon, at))
+        Ok(self.pass(s, [angular, linear], s.splat(1.0 / pivot), s.splat(epsilon), at))
     }
 
-    /// `P+ = P - G D G*` and `z+ = z + G epsilon + P+ a`, with `P H*` and the inverse of D at hand.
+    /// `P+ = P - G D G*` and `z+ = z + G epsilon + P+ a`, with `P H*` at hand, and the inverse of D and epsilon everywhere.
     #[inline(always)]
-    fn pass<L: Lanes<V = V>>(&mut self, s: L, [angular, linear]: Pair<V>, inverse: f64, epsilon: f64, at: &Arm<V>) -> Gain {
-        let nu = epsilon * inverse;
-        let gain = [s.mul(angular, s.splat(inverse)), s.mul(linear, s.splat(inverse))];
-        self.inertia = self.inertia.less(s, [angular, linear], gain);
-        self.moment = s.mul_add(angular, s.splat(nu), self.moment);
-        self.force = s.mul_add(linear, s.splat(nu), self.force);
+    fn pass<L: Lanes<V = V>>(&mut self, s: L, [angular, linear]: Pair<V>, inverse: V, epsilon: V, at: &Arm<V>) -> Gain {
+        let nu = s.mul(epsilon, inverse);
+        self.inertia = self.inertia.less(s, [angular, linear], inverse);
+        self.moment = s.mul_add(angular, nu, self.moment);
+        self.force = s.mul_add(linear, nu, self.force);
         self.take_bias(s, at);
-        let [x, y, z] = s.three(gain[0]);
-        Gain { angular: [x, y, z, nu], linear: s.store(gain[1]) }
+        let [x, y, z] = s.three(s.mul(angular, inverse));
+        Gain { angular: [x, y, z, s.first(nu)], linear: s.store(s.mul(linear, inverse)) }
     }
 
     /// `z <- z + P a`.

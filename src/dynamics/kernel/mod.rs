@@ -114,13 +114,22 @@ impl TreeKernel {
 
     /// Accelerations of all hinge rates and modal coordinates at `state`, into `hinge` and `modal`.
     pub(super) fn evaluate(&mut self, system: &System, state: &State, hinge: &mut [f64], modal: &mut [f64]) -> Result<(), Doubtful> {
-        self.processor.run(Evaluation { tree: self, system, state, hinge, modal, passes: [true; 3] })
+        self.run([true; 3], system, state, hinge, modal)
     }
 
     /// One of the three passes alone, at a state that was evaluated before: for measuring it. What it leaves is of no other use.
     pub(super) fn repeat_pass(&mut self, pass: usize, system: &System, state: &State, hinge: &mut [f64], modal: &mut [f64]) {
-        let passes = std::array::from_fn(|i| i == pass);
-        let _ = self.processor.run(Evaluation { tree: self, system, state, hinge, modal, passes });
+        let _ = self.run(std::array::from_fn(|i| i == pass), system, state, hinge, modal);
+    }
+
+    /// Both with a copy of the passes that knows whether loads are asked for.
+    fn run(&mut self, passes: [bool; 3], system: &System, state: &State, hinge: &mut [f64], modal: &mut [f64]) -> Result<(), Doubtful> {
+        let processor = self.processor;
+        if self.loads.is_empty() {
+            processor.run(Evaluation::<false> { tree: self, system, state, hinge, modal, passes })
+        } else {
+            processor.run(Evaluation::<true> { tree: self, system, state, hinge, modal, passes })
+        }
     }
 
     /// Load at the hinge of body `k` after the last evaluation: (moment N m about O; force N), by the parent on the child, O axes. Not a
@@ -131,6 +140,7 @@ impl TreeKernel {
     }
 
     /// All of them, one per body; none if loads were not asked for.
+    #[inline]
     pub(super) fn hinge_loads(&self) -> &[Vector6<f64>] {
         &self.loads
     }
@@ -169,7 +179,7 @@ impl TreeKernel {
 }
 
 /// One evaluation.
-struct Evaluation<'a> {
+struct Evaluation<'a, const LOADS: bool> {
     tree: &'a mut TreeKernel,
     system: &'a System,
     state: &'a State,
@@ -178,7 +188,7 @@ struct Evaluation<'a> {
     passes: [bool; 3],
 }
 
-impl Kernel for Evaluation<'_> {
+impl<const LOADS: bool> Kernel for Evaluation<'_, LOADS> {
     type Output = Result<(), Doubtful>;
 
     #[inline(always)]
@@ -188,10 +198,10 @@ impl Kernel for Evaluation<'_> {
             outward::outward(lanes, tree, system, state);
         }
         if passes[1] {
-            inward::inward(lanes, tree, system, state)?;
+            inward::inward::<L, LOADS>(lanes, tree, system, state)?;
         }
         if passes[2] {
-            accelerate::accelerate(lanes, tree, system, state, hinge, modal);
+            accelerate::accelerate::<L, LOADS>(lanes, tree, system, state, hinge, modal);
         }
         Ok(())
     }

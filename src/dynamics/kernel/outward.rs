@@ -12,7 +12,7 @@ pub fn outward<L: Lanes>(s: L, tree: &mut TreeKernel, system: &System, state: &S
     let TreeKernel { layout, motion, general, flexible, modal_shapes, velocity, .. } = tree;
     let (mut last, mut turn, mut omega) = (NONE, block(s, &Motion::REST.turn), s.splat(0.0));
     for (k, link) in layout.links.iter().enumerate() {
-        if link.parent != last || link.tip != NONE {
+        if !link.is_plain && (link.parent != last || link.tip != NONE) {
             (turn, omega) = parent_motion(s, link, layout, motion, flexible);
         }
         let shape = &layout.shapes[link.shape as usize];
@@ -36,7 +36,9 @@ pub fn outward<L: Lanes>(s: L, tree: &mut TreeKernel, system: &System, state: &S
             }
             motion[k] = Motion { turn: stored(s, turn), omega: s.store(omega) };
         }
-        if let Some(own) = flexible.get_mut(link.flexible as usize) {
+        if !link.is_plain
+            && let Some(own) = flexible.get_mut(link.flexible as usize)
+        {
             let constants = &modal_shapes[own.shape];
             own.follow(s, system, state, constants, &motion[k]);
         }

@@ -45,6 +45,8 @@ pub trait Lanes: Copy {
     fn mul_add(self, a: Self::V, b: Self::V, c: Self::V) -> Self::V;
     /// `c - a b`.
     fn mul_take(self, a: Self::V, b: Self::V, c: Self::V) -> Self::V;
+    /// `1 / a`, number by number.
+    fn inverse(self, a: Self::V) -> Self::V;
     /// (y, z, x).
     fn yzx(self, a: Self::V) -> Self::V;
     /// (z, x, y).
@@ -100,11 +102,17 @@ pub trait Lanes: Copy {
         (x + y) + z
     }
 
-    /// `a . b`.
+    /// `x + y + z` in each of the first three places: ready to be multiplied with, sooner than one number that must be spread.
     #[inline(always)]
-    fn dot(self, a: Self::V, b: Self::V) -> f64 {
-        let [x, y, z, _] = self.store(self.mul(a, b));
-        (x + y) + z
+    fn total(self, a: Self::V) -> Self::V {
+        self.add(self.add(a, self.yzx(a)), self.zxy(a))
+    }
+
+    /// The first number.
+    #[inline(always)]
+    fn first(self, a: Self::V) -> f64 {
+        let [x, ..] = self.store(a);
+        x
     }
 
     /// `a . b + c . d`.

@@ -56,6 +56,11 @@ impl Lanes for Plain {
     }
 
     #[inline(always)]
+    fn inverse(self, a: [f64; 4]) -> [f64; 4] {
+        [1.0 / a[0], 1.0 / a[1], 1.0 / a[2], 1.0 / a[3]]
+    }
+
+    #[inline(always)]
     fn yzx(self, a: [f64; 4]) -> [f64; 4] {
         [a[1], a[2], a[0], a[3]]
     }

@@ -59,6 +59,11 @@ impl Lanes for Wide {
     }
 
     #[inline(always)]
+    fn inverse(self, a: Self::V) -> Self::V {
+        self.avx._mm256_div_pd(self.avx._mm256_set1_pd(1.0), a)
+    }
+
+    #[inline(always)]
     fn yzx(self, a: Self::V) -> Self::V {
         self.avx2._mm256_permute4x64_pd::<0b11_00_10_01>(a)
     }
