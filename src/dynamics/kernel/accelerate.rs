@@ -1,10 +1,10 @@
 //! Third pass: accelerations and hinge loads, from the base to the tips. Source: Paper Eq. 13 and 18, in inertial axes.
 
-use super::layout::{Passage, Shape};
+use super::layout::{Axes, Link, Passage, Shape};
 use super::record::{Motion, Outboard, block};
-use super::{Branch, NONE, TreeKernel, arm, parent_motion};
+use super::{Branch, NONE, TreeKernel};
 use crate::dynamics::sweep::force_inward::world_acceleration;
-use crate::model::{State, System};
+use crate::model::System;
 use crate::spatial::lanes::Lanes;
 use crate::spatial::shift::spatial;
 use nalgebra::{Vector3, Vector6};
@@ -17,15 +17,8 @@ const AHEAD: usize = 8;
 
 /// Fills `hinge` with the accelerations of the hinge rates, and the loads if `LOADS`.
 #[inline(always)]
-pub fn accelerate<L: Lanes, const LOADS: bool>(
-    s: L,
-    tree: &mut TreeKernel,
-    system: &System,
-    state: &State,
-    hinge: &mut [f64],
-    modal: &mut [f64],
-) {
-    let TreeKernel { layout, motion, gains, outboard, loads, branches, general, flexible, modal_shapes, .. } = tree;
+pub fn accelerate<L: Lanes, const LOADS: bool>(s: L, tree: &mut TreeKernel, system: &System, hinge: &mut [f64], modal: &mut [f64]) {
+    let TreeKernel { layout, motion, hinges, outboard, loads, branches, general, flexible, modal_shapes, .. } = tree;
     let world = world_acceleration(system);
     let at_world = (s.of_three([world[0], world[1], world[2]]), s.of_three([world[3], world[4], world[5]]));
     let mut last = NONE;
@@ -33,7 +26,7 @@ pub fn accelerate<L: Lanes, const LOADS: bool>(
     let is_far = size_of_val(outboard.as_slice()) > FAR;
     // slices of one length need no check of an index in the loop
     let n = layout.links.len();
-    let (links, motion, gains) = (&layout.links[..n], &motion[..n], &gains[..n]);
+    let (links, motion, hinges) = (&layout.links[..n], &motion[..n], &hinges[..n]);
     let (outboard, loads) = if LOADS { (&outboard[..n], &mut loads[..n]) } else { (&outboard[..0], &mut loads[..0]) };
     for k in 0..n {
         let link = &links[k];
@@ -48,7 +41,6 @@ pub fn accelerate<L: Lanes, const LOADS: bool>(
                 None => at_world,
             };
         }
-        let shape = &layout.shapes[link.shape as usize];
         if LOADS
             && is_far
             && let Some(next) = outboard.get(k + AHEAD)
@@ -56,23 +48,21 @@ pub fn accelerate<L: Lanes, const LOADS: bool>(
             s.fetch(next);
         }
         if link.passage != Passage::General {
-            let (turn, omega) = parent_motion(s, link, layout, motion, flexible);
-            let axis = s.load(motion[k].turn[2]);
-            let at = arm(s, link, shape, state, turn, omega, axis);
+            let own = &hinges[k];
             // alpha+ = phi* alpha of the parent
-            linear = s.sub(linear, s.cross(at.l, angular));
+            linear = s.sub(linear, s.cross(s.load(own.l), angular));
             if LOADS {
-                write_load(s, &outboard[k], &motion[k], shape, [angular, linear], &mut loads[k]);
+                write_load(s, &outboard[k], &motion[k], link, &layout.shapes, [angular, linear], &mut loads[k]);
             }
-            (angular, linear) = (s.add(angular, at.angular), s.add(linear, at.linear));
+            (angular, linear) = (s.add(angular, s.load(own.bias_angular)), s.add(linear, s.load(own.bias_linear)));
             if link.passage != Passage::Fixed {
-                let g = &gains[k];
-                let (gain_angular, gain_linear) = (s.load(g.angular), s.load(g.linear));
-                let acceleration = g.angular[3] - s.dot_two(gain_angular, angular, gain_linear, linear);
+                let axis = s.load(motion[k].turn[2]);
+                let acceleration = own.gain_angular[3] - s.dot_two(s.load(own.gain_angular), angular, s.load(own.gain_linear), linear);
                 hinge[link.v as usize] = acceleration;
                 if link.passage == Passage::Revolute {
                     angular = s.mul_add(axis, s.splat(acceleration), angular);
                 } else {
+                    let shape = &layout.shapes[link.shape as usize];
                     angular = s.mul_add(axis, s.splat(shape.turn_rate * acceleration), angular);
                     linear = s.mul_add(axis, s.splat(shape.travel_rate * acceleration), linear);
                 }
@@ -81,7 +71,7 @@ pub fn accelerate<L: Lanes, const LOADS: bool>(
             let own = &general[link.general as usize];
             linear = s.sub(linear, s.cross(s.of_three(own.l.into()), angular));
             if LOADS {
-                write_load(s, &outboard[k], &motion[k], shape, [angular, linear], &mut loads[k]);
+                write_load(s, &outboard[k], &motion[k], link, &layout.shapes, [angular, linear], &mut loads[k]);
             }
             let rates = system.bodies[k].velocity_range();
             let outer = spatial(&Vector3::from(s.three(angular)), &Vector3::from(s.three(linear)));
@@ -105,18 +95,28 @@ pub fn accelerate<L: Lanes, const LOADS: bool>(
 
 /// `P+ alpha+ + z+`, turned into O axes.
 #[inline(always)]
-fn write_load<L: Lanes>(s: L, felt: &Outboard, motion: &Motion, shape: &Shape, [angular, linear]: [L::V; 2], load: &mut Vector6<f64>) {
+fn write_load<L: Lanes>(
+    s: L,
+    felt: &Outboard,
+    motion: &Motion,
+    link: &Link,
+    shapes: &[Shape],
+    [angular, linear]: [L::V; 2],
+    load: &mut Vector6<f64>,
+) {
     let [moment, force] = felt.inertia(s).times_add(s, angular, linear, felt.wrench(s));
-    let (axes, t) = (&motion.turn, &shape.turn);
-    // places to load from, not branches: those would take the room in which the processor remembers the ends of arms
-    let axes = if let Some([x, y, z]) = shape.order {
-        [s.load(axes[usize::from(x)]), s.load(axes[usize::from(y)]), s.load(axes[usize::from(z)])]
+    let [x, y, z] = block(s, &motion.turn);
+    // a table of jumps, which a match would become, is foreseen less well than these two
+    let axes = if link.axes == Axes::Same {
+        [x, y, z]
+    } else if link.axes == Axes::Next {
+        [y, z, x]
     } else {
-        let axes = block(s, axes);
+        let t = &shapes[link.shape as usize].turn;
         [
-            s.combine_numbers(axes, [t[0], t[3], t[6]]),
-            s.combine_numbers(axes, [t[1], t[4], t[7]]),
-            s.combine_numbers(axes, [t[2], t[5], t[8]]),
+            s.combine_numbers([x, y, z], [t[0], t[3], t[6]]),
+            s.combine_numbers([x, y, z], [t[1], t[4], t[7]]),
+            s.combine_numbers([x, y, z], [t[2], t[5], t[8]]),
         ]
     };
     let moments = [s.mul(axes[0], moment), s.mul(axes[1], moment), s.mul(axes[2], moment)];

@@ -3,7 +3,7 @@
 use super::cyclic::{Inertia, Turns, general_product, square, symmetric_product, symmetric_times, transposed_times};
 use super::hinge::external_force;
 use super::layout::{Passage, Shape};
-use super::record::{Gain, Outboard, block};
+use super::record::{Hinge, Outboard, block};
 use super::six::{Pair, Six};
 use super::tip::columns_of;
 use super::{Arm, Doubtful, TreeKernel, arm, parent_motion};
@@ -20,17 +20,17 @@ pub struct Felt<V> {
     force: V,
 }
 
-/// Fills the gains, and what loads are made of.
+/// Fills the hinges, and what loads are made of.
 #[inline(always)]
 pub fn inward<L: Lanes, const LOADS: bool>(s: L, tree: &mut TreeKernel, system: &System, state: &State) -> Result<(), Doubtful> {
-    let TreeKernel { layout, motion, gains, outboard, branches, general, flexible, modal_shapes, external, .. } = tree;
+    let TreeKernel { layout, motion, hinges, outboard, branches, general, flexible, modal_shapes, external, .. } = tree;
     for branch in branches.iter_mut() {
         branch.felt = Outboard::default();
     }
     let mut felt = Felt::none(s);
     // slices of one length need no check of an index in the loop
     let n = layout.links.len();
-    let (links, motion, gains) = (&layout.links[..n], &motion[..n], &mut gains[..n]);
+    let (links, motion, hinges) = (&layout.links[..n], &motion[..n], &mut hinges[..n]);
     let outboard = if LOADS { &mut outboard[..n] } else { &mut outboard[..0] };
     for k in (0..n).rev() {
         let link = &links[k];
@@ -62,9 +62,12 @@ pub fn inward<L: Lanes, const LOADS: bool>(s: L, tree: &mut TreeKernel, system: 
             let (parent_turn, parent_omega) = parent_motion(s, link, layout, motion, flexible);
             let at = arm(s, link, shape, state, parent_turn, parent_omega, turn[2]);
             match link.passage {
-                Passage::Revolute => gains[k] = felt.pass_revolute(s, turn[2], link.applied(system, state, layout), &at)?,
-                Passage::Slide => gains[k] = felt.pass_slide(s, turn[2], shape, link.applied(system, state, layout), &at)?,
-                Passage::Fixed | Passage::General => felt.take_bias(s, &at),
+                Passage::Revolute => hinges[k] = felt.pass_revolute(s, turn[2], link.applied(system, state, layout), &at)?,
+                Passage::Slide => hinges[k] = felt.pass_slide(s, turn[2], shape, link.applied(system, state, layout), &at)?,
+                Passage::Fixed | Passage::General => {
+                    felt.take_bias(s, &at);
+                    hinges[k] = Hinge { l: s.store(at.l), bias_linear: s.store(at.linear), ..Hinge::default() };
+                }
             }
             at.l
         };
@@ -118,7 +121,7 @@ impl<V: Copy> Felt<V> {
 
     /// Through a revolute hinge about `axis` with the torque `applied`: what is left is `P+` and `z+`.
     #[inline(always)]
-    fn pass_revolute<L: Lanes<V = V>>(&mut self, s: L, axis: V, applied: f64, at: &Arm<V>) -> Result<Gain, Doubtful> {
+    fn pass_revolute<L: Lanes<V = V>>(&mut self, s: L, axis: V, applied: f64, at: &Arm<V>) -> Result<Hinge, Doubtful> {
         // P H*, D and its inverse
         let angular = symmetric_times(s, self.inertia.rotational, axis);
         let linear = transposed_times(s, self.inertia.coupling, axis);
@@ -133,7 +136,7 @@ impl<V: Copy> Felt<V> {
 
     /// The same through a hinge that travels along `axis`, and turns about it or not.
     #[inline(always)]
-    fn pass_slide<L: Lanes<V = V>>(&mut self, s: L, axis: V, shape: &Shape, applied: f64, at: &Arm<V>) -> Result<Gain, Doubtful> {
+    fn pass_slide<L: Lanes<V = V>>(&mut self, s: L, axis: V, shape: &Shape, applied: f64, at: &Arm<V>) -> Result<Hinge, Doubtful> {
         let (turn, travel) = (s.mul(axis, s.splat(shape.turn_rate)), s.mul(axis, s.splat(shape.travel_rate)));
         let [angular, linear] = self.inertia.times_add(s, turn, travel, [s.splat(0.0); 2]);
         let pivot = s.dot_two(turn, angular, travel, linear);
@@ -148,14 +151,20 @@ impl<V: Copy> Felt<V> {
 
     /// `P+ = P - G D G*` and `z+ = z + G epsilon + P+ a`, with `P H*` at hand, and the inverse of D and epsilon everywhere.
     #[inline(always)]
-    fn pass<L: Lanes<V = V>>(&mut self, s: L, [angular, linear]: Pair<V>, inverse: V, epsilon: V, at: &Arm<V>) -> Gain {
+    fn pass<L: Lanes<V = V>>(&mut self, s: L, [angular, linear]: Pair<V>, inverse: V, epsilon: V, at: &Arm<V>) -> Hinge {
         let nu = s.mul(epsilon, inverse);
         self.inertia = self.inertia.less(s, [angular, linear], inverse);
         self.moment = s.mul_add(angular, nu, self.moment);
         self.force = s.mul_add(linear, nu, self.force);
         self.take_bias(s, at);
         let [x, y, z] = s.three(s.mul(angular, inverse));
-        Gain { angular: [x, y, z, s.first(nu)], linear: s.store(s.mul(linear, inverse)) }
+        Hinge {
+            gain_angular: [x, y, z, s.first(nu)],
+            gain_linear: s.store(s.mul(linear, inverse)),
+            l: s.store(at.l),
+            bias_angular: s.store(at.angular),
+            bias_linear: s.store(at.linear),
+        }
     }
 
     /// `z <- z + P a`.

@@ -23,19 +23,34 @@ pub struct Shape {
     pub inertia: [f64; 9],
     /// Link axes to O axes.
     pub turn: Matrix3<f64>,
-    /// Which link axes the axes of O are; none if they are oblique to one another.
-    pub order: Option<[u8; 3]>,
     /// Turn (rad) and travel (m) along the third axis per unit of the coordinate of a hinge of one rate.
     pub turn_rate: f64,
     pub travel_rate: f64,
 }
 
-/// Which link axes the axes of O are, for link axes that `turn` takes to O axes.
-fn order_of(turn: &Matrix3<f64>) -> Option<[u8; 3]> {
-    [[0, 1, 2], [1, 2, 0], [2, 0, 1]].into_iter().find(|order| {
-        let rows = order.map(|i| Vector3::ith(usize::from(i), 1.0).transpose());
-        *turn == Matrix3::from_rows(&rows)
-    })
+/// Which link axes (x, y, z) the axes of O are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Axes {
+    /// (x, y, z): the hinge axis is that of O.
+    Same,
+    /// (y, z, x).
+    Next,
+    /// Neither.
+    Turned,
+}
+
+impl Axes {
+    /// For link axes that `turn` takes to O axes.
+    fn of(turn: &Matrix3<f64>) -> Self {
+        let (x, y, z) = (Vector3::x(), Vector3::y(), Vector3::z());
+        if *turn == Matrix3::identity() {
+            Self::Same
+        } else if *turn == Matrix3::from_columns(&[z, x, y]) {
+            Self::Next
+        } else {
+            Self::Turned
+        }
+    }
 }
 
 /// How the passes take a hinge.
@@ -63,6 +78,8 @@ pub struct Link {
     /// Rigid, without external load, joined to the body before it and to no other but the one after it: most bodies of long chains, which need
     /// none of the questions that the others are asked.
     pub is_plain: bool,
+    /// What the way from link axes to O axes is.
+    pub axes: Axes,
     /// What its hinge is.
     pub passage: Passage,
     /// Index in `TreeKernel::general`, [`NONE`] for the other passages.
@@ -151,6 +168,7 @@ impl Layout {
                 shape,
                 branch: NONE,
                 is_plain: false,
+                axes: Axes::of(&layout.shapes[shape as usize].turn),
                 passage: passage_of(body),
                 general: NONE,
                 drive: NONE,
@@ -289,7 +307,6 @@ impl Shape {
             mass: if body.flexible().is_some() { 0.0 } else { body.mass() },
             inertia: column((rotational + rotational.transpose()) * 0.5),
             turn,
-            order: order_of(&turn),
             turn_rate: single.map_or(0.0, |s| s.1),
             travel_rate: single.map_or(0.0, |s| s.2),
         }

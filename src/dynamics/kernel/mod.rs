@@ -8,14 +8,13 @@
 //! | pass | leaves | numbers per body |
 //! |---|---|---|
 //! | `outward`: attitude and angular velocity | `Motion` | 16 |
-//! | `inward`: articulated inertias, residual forces | `Gain` | 8 |
+//! | `inward`: articulated inertias, residual forces | `Hinge` | 20 |
 //! | the same, where loads are asked for | `Outboard` | 36 |
 //! | `accelerate`: accelerations and loads | the load | 6 |
 //!
 //! Modes are the business of `flexible`, in the axes of each body.
 //!
-//! What is cheaper to compute again than to fetch (the arm from the parent, the velocity terms) is not stored, so that long chains stay
-//! in the caches. Bodies that are alike share their constants. A child that follows its parent in the order, as in every chain, finds the
+//! Bodies that are alike share their constants. A child that follows its parent in the order, as in every chain, finds the
 //! parent's quantities in registers; only branching bodies keep theirs in memory.
 //!
 //! Axes: "link axes" are those of O, turned so that the axis of a hinge of one rate is their third. Registers: [`crate::spatial::lanes`].
@@ -41,7 +40,7 @@ use hinge::GeneralHinge;
 use layout::{Layout, Link, NONE, Passage, Shape};
 use modal_shape::ModalShape;
 use nalgebra::{Vector3, Vector6};
-use record::{Gain, Motion, Outboard};
+use record::{Hinge, Motion, Outboard};
 
 /// Quantities of a body that some child does not follow directly.
 #[derive(Debug, Clone, Copy)]
@@ -62,7 +61,7 @@ pub struct TreeKernel {
     processor: Processor,
     layout: Layout,
     motion: Vec<Motion>,
-    gains: Vec<Gain>,
+    hinges: Vec<Hinge>,
     outboard: Vec<Outboard>,
     /// Load at every hinge: (moment about O; force), O axes.
     loads: Vec<Vector6<f64>>,
@@ -99,7 +98,7 @@ impl TreeKernel {
         Some(Self {
             processor,
             motion: vec![Motion::REST; n],
-            gains: vec![Gain::default(); n],
+            hinges: vec![Hinge::default(); n],
             outboard: vec![Outboard::default(); if with_loads { n } else { 0 }],
             loads: vec![Vector6::zeros(); if with_loads { n } else { 0 }],
             branches: vec![Branch { felt: Outboard::default(), acceleration: [0.0; 6] }; layout.branches],
@@ -201,7 +200,7 @@ impl<const LOADS: bool> Kernel for Evaluation<'_, LOADS> {
             inward::inward::<L, LOADS>(lanes, tree, system, state)?;
         }
         if passes[2] {
-            accelerate::accelerate::<L, LOADS>(lanes, tree, system, state, hinge, modal);
+            accelerate::accelerate::<L, LOADS>(lanes, tree, system, hinge, modal);
         }
         Ok(())
     }

@@ -22,14 +22,20 @@ pub struct Motion {
     pub omega: Quad,
 }
 
-/// `G = P H* / D` of a hinge of one rate, inertial axes at O.
+/// What a hinge of at most one rate leaves for the accelerations, inertial axes at O.
 #[derive(Debug, Clone, Copy, Default)]
 #[repr(C, align(32))]
-pub struct Gain {
-    /// Its angular half; the fourth number is `nu`.
-    pub angular: Quad,
+pub struct Hinge {
+    /// Gain `G = P H* / D`, angular half; the fourth number is `nu`. No gain without a rate.
+    pub gain_angular: Quad,
     /// Its linear half.
-    pub linear: Quad,
+    pub gain_linear: Quad,
+    /// O of the parent to O (m).
+    pub l: Quad,
+    /// Bias acceleration, angular half.
+    pub bias_angular: Quad,
+    /// Its linear half.
+    pub bias_linear: Quad,
 }
 
 /// Inertia and residual force that a body leaves, `P+` and `z+` at O, inertial axes: blocks by cyclic diagonals.
