@@ -66,16 +66,16 @@ pub fn run(arguments: &RunArguments, output: &mut dyn Write) -> Result<(), Failu
 
     let mut progress = Progress::new(&settings);
     let started = Instant::now();
-    let mut recorder = arguments.verify.then(|| Recorder::new(&scene, None));
+    let mut recorder = arguments.verify.then(|| Recorder::new(&scene, &[], None));
     let mut observers: Vec<&mut dyn Observer> = vec![&mut outputs, &mut progress];
     observers.extend(recorder.as_mut().map(|r| r as &mut dyn Observer));
     let summary = simulate(&scene.system, &scene.state, &settings, &mut observers);
     let wall = started.elapsed();
     progress.bar.finish_and_clear();
     let report = outputs.finish(&summary, scene.method.name(), wall, left_out);
-    let verification = match &recorder {
+    let verification = match recorder {
         Some(recorder) if summary.outcome == Outcome::Completed => {
-            Some(verify(&scene, &settings, plan_of_loads, &report, &recorder.history, &mut progress)?)
+            Some(verify(&scene, &settings, plan_of_loads, &report, &recorder.finish(), &mut progress)?)
         }
         _ => None,
     };
@@ -126,7 +126,7 @@ fn verify(
 ) -> Result<Verification, Failure> {
     let settings = Settings { method: tighter(settings.method), ..*settings };
     let mut outputs = OutputSet::new(&scene.system, plan).map_err(|e| Failure::input(with_causes(&e)))?;
-    let mut recorder = Recorder::new(scene, None);
+    let mut recorder = Recorder::new(scene, &[], None);
     progress.bar = bar(&settings);
     progress.verifying = true;
     let started = Instant::now();
@@ -134,7 +134,7 @@ fn verify(
     let wall = started.elapsed();
     progress.bar.finish_and_clear();
     let tight = outputs.finish(&summary, settings.method.name(), wall, Vec::new());
-    Ok(Verification::of(&scene.system, settings.method, [report, &tight], [history, &recorder.history]))
+    Ok(Verification::of(&scene.system, settings.method, [report, &tight], [history, &recorder.finish()]))
 }
 
 /// Most output times of a run; each is held against the limits, written and drawn.

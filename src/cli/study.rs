@@ -10,13 +10,16 @@ use crate::study::reference::{Candidates, ReferenceSource};
 use crate::study::report::PointReport;
 use crate::study::{ChannelError, Grid, Request, StateError, StateFile, StudyError, StudyReport, Watch, plot, runner};
 use indicatif::{ProgressBar, ProgressStyle};
-use std::io::Write;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Most output times times numbers of a history that is kept.
 const MOST_NUMBERS: f64 = 5e7;
+
+/// Most settings whose channels are shown one by one.
+const MOST_FRONT: usize = 6;
 
 /// Runs the study and reports.
 pub fn run(arguments: &StudyArguments, output: &mut dyn Write) -> Result<(), Failure> {
@@ -103,12 +106,12 @@ fn check(arguments: &StudyArguments) -> Result<(), Failure> {
 /// Refuses a study whose histories fill the memory.
 fn check_size(grid: &Grid) -> Result<(), Failure> {
     let base = &grid.base;
-    let numbers = base.rate_hz * base.duration.unwrap_or(0.0) * 6.0 * (base.hinges.len() + base.closures.len()) as f64;
+    let numbers = base.rate_hz * base.duration.unwrap_or(0.0) * grid.width() as f64;
     if numbers <= MOST_NUMBERS {
         return Ok(());
     }
     Err(Failure::input(format!(
-        "{}: the loads at all output times are {numbers:e} numbers, more than {MOST_NUMBERS:e}; lower output.rate_hz, name fewer \
+        "{}: what is compared at all output times is {numbers:e} numbers, more than {MOST_NUMBERS:e}; lower output.rate_hz, name fewer \
          output.hinges or give a shorter --duration",
         base.source.path.display()
     )))
@@ -143,7 +146,7 @@ fn check_targets(arguments: &StudyArguments, grid: &Grid) -> Result<(), Failure>
 #[cfg(feature = "hdf5")]
 fn reference(arguments: &StudyArguments, grid: &Grid) -> Result<ReferenceSource, Failure> {
     match &arguments.reference {
-        Some(path) => Ok(crate::study::reference::read(path, &grid.base)?),
+        Some(path) => Ok(crate::study::reference::read(path, grid)?),
         None => Ok(ReferenceSource::Run(Candidates::of(grid)?)),
     }
 }
@@ -173,7 +176,7 @@ fn write_files(arguments: &StudyArguments, report: &StudyReport) -> Result<(), F
 fn write_tables(report: &StudyReport, output: &mut dyn Write) -> Result<(), Failure> {
     let reference = &report.reference;
     let trust = reference.own_error.map_or_else(String::new, |e| format!(", which a run at ten times its tolerance misses by {e:.0e}"));
-    writeln!(output, "{}: {} s, loads at {} output times per second", report.scene, report.duration_s, report.rate_hz)?;
+    writeln!(output, "{}: {} s, compared at {} output times per second", report.scene, report.duration_s, report.rate_hz)?;
     writeln!(output, "reference: {}{trust}", reference.what)?;
     let right = Align::Right;
     let mut table = Table::new(&[
@@ -188,6 +191,7 @@ fn write_tables(report: &StudyReport, output: &mut dyn Write) -> Result<(), Fail
         ("from", right),
         ("to", right),
         ("steps", right),
+        ("evaluations", right),
         ("peak error", right),
         ("rms error", right),
         ("worst channel", Align::Left),
@@ -196,8 +200,14 @@ fn write_tables(report: &StudyReport, output: &mut dyn Write) -> Result<(), Fail
     for (index, point) in report.points.iter().enumerate() {
         table.row(row(point, cheapest == Some(index)));
     }
-    writeln!(output, "\nerrors of hinge and closure loads, relative to the largest reference value of each; * Pareto front, > cheapest:")?;
+    let stress = match report.stress_bodies.as_slice() {
+        [] => String::new(),
+        names => format!(" and of the largest stress of {}", names.join(", ")),
+    };
+    let scale = "relative to the largest reference value of each";
+    writeln!(output, "\nerrors of hinge and closure loads{stress}, {scale}; * Pareto front, > cheapest:")?;
     table.write(output)?;
+    write_channels(report, output)?;
     let budget = 100.0 * report.error_budget;
     match &report.cheapest {
         Some(cheapest) => {
@@ -246,10 +256,33 @@ fn row(point: &PointReport, cheapest: bool) -> Vec<String> {
         time(|t| t.min),
         time(|t| t.max),
         optional(point.steps.map(|s| s.to_string())),
+        optional(point.evaluations.map(|n| n.to_string())),
         optional(point.error.map(|e| format!("{:.1e}", e.peak))),
         optional(point.error.map(|e| format!("{:.1e}", e.rms))),
         point.failure.as_ref().map_or_else(|| worst.map_or_else(String::new, |w| w.0.to_owned()), |f| format!("failed: {f}")),
     ]
+}
+
+/// Errors by channel along the Pareto front.
+fn write_channels(report: &StudyReport, output: &mut dyn Write) -> io::Result<()> {
+    let mut front: Vec<&PointReport> = report.points.iter().filter(|p| p.pareto).collect();
+    let time = |p: &PointReport| p.run_time_s.map_or(f64::NAN, |t| t.median);
+    front.sort_by(|a, b| time(a).total_cmp(&time(b)));
+    let Some(first) = front.first() else { return Ok(()) };
+    // evenly thinned, ends kept
+    let shown = front.len().min(MOST_FRONT);
+    let taken: Vec<&PointReport> = (0..shown).map(|i| front[i * (front.len() - 1) / (shown - 1).max(1)]).collect();
+    let headings: Vec<String> = taken.iter().map(|p| format!("{:.3e} s", time(p))).collect();
+    let mut columns = vec![("channel", Align::Left)];
+    columns.extend(headings.iter().map(|h| (h.as_str(), Align::Right)));
+    let mut table = Table::new(&columns);
+    for (name, _) in first.channels.iter() {
+        let cell = |p: &&PointReport| p.channels.get(name).map_or_else(String::new, |e| format!("{:.1e} / {:.1e}", e.peak, e.rms));
+        table.row(std::iter::once(name.to_owned()).chain(taken.iter().map(cell)));
+    }
+    let thinned = if shown < front.len() { format!(", {shown} of its {} settings", front.len()) } else { String::new() };
+    writeln!(output, "\npeak / rms error of each channel against run time, along the Pareto front{thinned} (all others by --csv or --json):")?;
+    table.write(output)
 }
 
 /// What a variant adds to the modes, or expressly does not.

@@ -4,7 +4,7 @@ use super::plan::{BodyBox, BodySurface, ModalFileRecord, OutputPlan, TruncationP
 use crate::io::ModalFileError;
 use crate::model::Surface;
 use crate::model::{BodyKind, ModeBasis};
-use crate::scene::{Monitor, Scene};
+use crate::scene::Scene;
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -13,7 +13,6 @@ use std::sync::Arc;
 /// # Errors
 /// If the surface of a modal file cannot be read.
 pub fn plan(scene: &Scene, picture: bool) -> Result<OutputPlan, ModalFileError> {
-    let monitored = |body: usize| scene.monitors.iter().any(|m| matches!(m, Monitor::Body { body: b, .. } if *b == body));
     // bodies of one file and one choice of modes share their basis
     let mut shared: HashMap<*const ModeBasis, Arc<Surface>> = HashMap::new();
     let mut surfaces = Vec::new();
@@ -26,7 +25,7 @@ pub fn plan(scene: &Scene, picture: bool) -> Result<OutputPlan, ModalFileError> 
             residual_modes: selection.basis.has_residual().then(|| selection.basis.residual.clone()),
         });
         let has_stress = selection.file.stress_location()?.is_some();
-        let stress = has_stress && selection.basis.mode_count() > 0 && (scene.stress.contains(body) || monitored(*body));
+        let stress = has_stress && selection.basis.mode_count() > 0 && (scene.stress.contains(body) || scene.monitors_stress(*body));
         if picture || stress {
             let key = Arc::as_ptr(&selection.basis);
             let surface = match shared.get(&key) {

@@ -95,6 +95,8 @@ pub struct Scene {
     pub closures: Vec<usize>,
     /// Bodies whose stress is evaluated.
     pub stress: Vec<usize>,
+    /// True if the scene names these; else they are all flexible bodies.
+    pub stress_named: bool,
     /// Whether output times are audited.
     pub audit: bool,
     /// Whether the effect of modes that are left out is estimated.
@@ -137,6 +139,19 @@ impl Scene {
             settings::Accuracy::Step(step) => (self.control, Some(step)),
         };
         settings::named(integrator, &control, step, &self.system, self.rate_hz).map(|(method, _)| method)
+    }
+
+    /// True if a monitor watches the stress of `body`.
+    #[must_use]
+    pub fn monitors_stress(&self, body: usize) -> bool {
+        self.monitors.iter().any(|m| matches!(m, Monitor::Body { body: b, .. } if *b == body))
+    }
+
+    /// Bodies whose stress the scene asks for by name, in a monitor or in `output.stress`, in the order in which it defines them.
+    #[must_use]
+    pub fn asked_stress(&self) -> Vec<usize> {
+        let asked = |body: &usize| self.monitors_stress(*body) || (self.stress_named && self.stress.contains(body));
+        self.system.definition_order.iter().copied().filter(asked).collect()
     }
 
     /// The modes that the scene leaves out, beside the system with all of them, its inertia that of the undeformed bodies; none if none are, or if the scene cannot be assembled
@@ -280,6 +295,7 @@ fn assemble_spec(source: Source, spec: SceneSpec, overrides: &Overrides, files: 
         hinges,
         closures,
         stress,
+        stress_named: spec.output.stress.is_some(),
         audit: spec.output.audit,
         truncation: spec.output.truncation,
         monitors,

@@ -45,19 +45,27 @@ pub enum Gap {
     },
 }
 
-/// Share of the largest load of its kind below which a channel is silent: what it holds is rounding.
+/// Share of the largest value of its kind below which a channel is silent: what it holds is rounding.
 pub(super) const SILENT: f64 = 1e-9;
 
 /// What each channel's errors are relative to, its largest magnitude; none for a channel in which nothing happens.
 ///
-/// A moment counts as nothing beside moments and beside forces on arms of 1 m, a force beside forces.
+/// A moment counts as nothing beside moments and beside forces on arms of 1 m, a force beside forces, a stress beside stresses and beside
+/// forces on areas of 1 m^2.
 #[must_use]
 pub fn scales(reference: &History) -> Vec<Option<f64>> {
     let largest = |values: &[f64], width: usize| values.chunks_exact(width).map(norm).fold(0.0, f64::max);
     let sizes: Vec<f64> = reference.channels.iter().zip(&reference.values).map(|(c, v)| largest(v, c.width)).collect();
     let of = |kind| reference.channels.iter().zip(&sizes).filter(|(c, _)| c.kind == kind).fold(0.0_f64, |m, (_, s)| m.max(*s));
-    let (moment, force) = (of(Kind::Moment), of(Kind::Force));
-    let floor = |kind| SILENT * if kind == Kind::Moment { moment.max(force) } else { force };
+    let (moment, force, stress) = (of(Kind::Moment), of(Kind::Force), of(Kind::Stress));
+    let floor = |kind| {
+        SILENT
+            * match kind {
+                Kind::Moment => moment.max(force),
+                Kind::Force => force,
+                Kind::Stress => stress.max(force),
+            }
+    };
     reference.channels.iter().zip(sizes).map(|(c, size)| (size > floor(c.kind)).then_some(size)).collect()
 }
 

@@ -1,5 +1,7 @@
 //! What is run: every integrator at every accuracy with every variant of the system.
 
+use super::history::History;
+use super::stress::{StressError, StressGauge, StressGauges};
 use crate::integrate::simulate::Method;
 use crate::integrate::stability::fastest_mode;
 use crate::model::ClosureMethod;
@@ -46,6 +48,14 @@ pub enum RequestError {
     /// A scene that cannot be assembled.
     #[error(transparent)]
     Scene(#[from] SceneError),
+    /// Stress that cannot be compared.
+    #[error("{path}: {source}")]
+    Stress {
+        /// The scene.
+        path: String,
+        /// What is in the way.
+        source: StressError,
+    },
     /// A scene that a study can do nothing with.
     #[error("{path}: {message}")]
     Unfit {
@@ -150,13 +160,22 @@ impl Point {
     }
 }
 
+/// One system that is run, and what tells the stress of its bodies.
+#[derive(Debug)]
+pub struct Subject {
+    /// The scene.
+    pub scene: Scene,
+    /// Of the bodies whose stress is compared.
+    pub stress: Vec<StressGauge>,
+}
+
 /// Everything that is run.
 #[derive(Debug)]
 pub struct Grid {
     /// The scene as it is, with the duration of the study.
     pub base: Scene,
-    /// The variants of the system.
-    pub variants: Vec<(Variant, Scene)>,
+    /// The variants of the system; there is at least one.
+    pub variants: Vec<(Variant, Subject)>,
     /// All points; those of one curve follow each other, from coarse to fine.
     pub points: Vec<Point>,
     /// What was left out, and why.
@@ -188,9 +207,6 @@ impl Grid {
         let Some(duration) = base.duration else {
             return Err(unfit("the scene has no [simulation] duration; add one (s) or give --duration"));
         };
-        if base.hinges.is_empty() && base.closures.is_empty() {
-            return Err(unfit("a study compares loads, and output.hinges and output.closures name none; name some or drop the keys"));
-        }
         check_modes(source, request)?;
         let mut all = vec![Variant::default()];
         each(&mut all, &request.modes, |v, modes| v.modes = Some(modes));
@@ -198,9 +214,18 @@ impl Grid {
         each(&mut all, &request.geometric_stiffness, |v, on| v.geometric_stiffness = Some(on));
         each(&mut all, &request.orders, |v, order| v.inertia_order = Some(order));
         each(&mut all, &request.closure_methods, |v, method| v.closure_method = Some(method));
-        let assembled = all.into_iter().map(|variant| Ok((variant.clone(), variant.assemble(source, request.duration)?)));
-        let variants = assembled.collect::<Result<_, SceneError>>()?;
+        let mut gauges = StressGauges::default();
+        let mut assemble = |variant: Variant| {
+            let scene = variant.assemble(source, request.duration)?;
+            let path = || source.path.display().to_string();
+            let stress = gauges.of(&scene).map_err(|source| RequestError::Stress { path: path(), source })?;
+            Ok((variant, Subject { scene, stress }))
+        };
+        let variants = all.into_iter().map(&mut assemble).collect::<Result<_, RequestError>>()?;
         let mut grid = Self { base, variants, points: Vec::new(), notes: Vec::new() };
+        if grid.history().channels.is_empty() {
+            return Err(unfit("a study compares loads, and output.hinges and output.closures name none; name some or drop the keys"));
+        }
         let named = !request.integrators.is_empty();
         let integrators: Vec<&str> = match request.integrators.as_slice() {
             [] => INTEGRATORS.iter().map(|i| i.0).filter(|n| *n != "auto").collect(),
@@ -217,9 +242,28 @@ impl Grid {
         Ok(grid)
     }
 
+    /// Of the bodies whose stress is compared; their modes are those of some variant.
+    #[must_use]
+    pub fn stress(&self) -> &[StressGauge] {
+        self.variants.first().map_or(&[], |(_, subject)| &subject.stress)
+    }
+
+    /// An empty history of all that is compared.
+    #[must_use]
+    pub fn history(&self) -> History {
+        History::of(&self.base, self.stress())
+    }
+
+    /// Most numbers that a run keeps per output time.
+    #[must_use]
+    pub fn width(&self) -> usize {
+        let channels: usize = self.history().channels.iter().map(|c| c.width).sum();
+        channels + self.stress().iter().map(|gauge| gauge.available).sum::<usize>()
+    }
+
     /// Adds the points of one integrator with one variant; one that is not named and would take too long is noted instead.
     fn add_curve(&mut self, integrator: &str, index: usize, request: &Request, named: bool, duration: f64) {
-        let (variant, scene) = &self.variants[index];
+        let (variant, Subject { scene, .. }) = &self.variants[index];
         let accuracies: Vec<Accuracy> = if integrator == "rk4" {
             let steps = if request.steps.is_empty() { default_steps(scene, duration) } else { descending(&request.steps) };
             steps.into_iter().map(Accuracy::Step).collect()

@@ -1,8 +1,9 @@
-//! What a study compares: loads at hinges and closures at the output times.
+//! What a study compares: loads at hinges and closures, and the stress of bodies, at the output times.
 
+use super::stress::StressGauge;
 use crate::dynamics::hinge_load::hinge_load;
 use crate::integrate::{Flow, Observer, Sample};
-use crate::model::System;
+use crate::output::OutputPlan;
 use crate::output::closure_load::ClosureGauge;
 use crate::scene::Scene;
 use crate::scene::closures::gear_unit;
@@ -15,29 +16,35 @@ pub enum Kind {
     Moment,
     /// N.
     Force,
+    /// Pa.
+    Stress,
 }
 
-/// One load, with all its components.
+/// One load, with all its components, or one stress.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Channel {
-    /// "hinges" or "closures".
+    /// "hinges", "closures" or "bodies".
     pub group: &'static str,
-    /// Name of the hinge or closure.
+    /// Name of the hinge, closure or body.
     pub owner: String,
     /// Name of the quantity in results files.
     pub quantity: &'static str,
-    /// Moment or force.
+    /// Moment, force or stress.
     pub kind: Kind,
-    /// Numbers per output time: three in the axes of the load's frame, one for a gear.
+    /// Numbers per output time: three in the axes of the load's frame, one for a gear or a stress.
     pub width: usize,
 }
 
 impl Channel {
-    /// Name in tables: "drive moment", "closure strut force".
+    /// Name in tables: "drive moment", "closure strut force", "panel stress".
     #[must_use]
     pub fn name(&self) -> String {
         let group = if self.group == "closures" { "closure " } else { "" };
-        let kind = if self.kind == Kind::Moment { "moment" } else { "force" };
+        let kind = match self.kind {
+            Kind::Moment => "moment",
+            Kind::Force => "force",
+            Kind::Stress => "stress",
+        };
         format!("{group}{} {kind}", self.owner)
     }
 }
@@ -54,16 +61,24 @@ pub struct History {
 }
 
 impl History {
-    /// An empty history of the loads that a scene outputs.
+    /// An empty history of the loads that a scene outputs or monitors, and of the stress of the bodies of `stress`.
     #[must_use]
-    pub fn of(scene: &Scene) -> Self {
-        let channels = channels(&scene.system, &scene.hinges, &scene.closures);
+    pub fn of(scene: &Scene, stress: &[StressGauge]) -> Self {
+        let channels = channels(scene, stress);
         Self { values: vec![Vec::new(); channels.len()], channels, times: Vec::new() }
     }
 }
 
-/// Hinges first, then closures; moment before force.
-fn channels(system: &System, hinges: &[usize], closures: &[usize]) -> Vec<Channel> {
+/// Hinges and closures whose load a scene outputs, then those that it only monitors.
+fn loaded(scene: &Scene) -> (Vec<usize>, Vec<usize>) {
+    let (hinges, closures, monitors) = (scene.hinges.clone(), scene.closures.clone(), scene.monitors.clone());
+    let plan = OutputPlan { hinges, closures, monitors, ..OutputPlan::default() };
+    (plan.loaded_hinges(), plan.loaded_closures())
+}
+
+/// Hinges first, then closures, then bodies; moment before force.
+fn channels(scene: &Scene, stress: &[StressGauge]) -> Vec<Channel> {
+    let (system, (hinges, closures)) = (&scene.system, loaded(scene));
     let joint = |group, owner: &str| {
         [("load_moment", Kind::Moment), ("load_force", Kind::Force)].map(|(quantity, kind)| Channel {
             group,
@@ -73,8 +88,8 @@ fn channels(system: &System, hinges: &[usize], closures: &[usize]) -> Vec<Channe
             width: 3,
         })
     };
-    let mut channels: Vec<_> = hinges.iter().flat_map(|&k| joint("hinges", &system.bodies[k].hinge.name)).collect();
-    for &index in closures {
+    let mut channels: Vec<_> = hinges.into_iter().flat_map(|k| joint("hinges", &system.bodies[k].hinge.name)).collect();
+    for index in closures {
         let closure = &system.closures[index];
         match gear_unit(system, closure) {
             None => channels.extend(joint("closures", &closure.name)),
@@ -87,6 +102,13 @@ fn channels(system: &System, hinges: &[usize], closures: &[usize]) -> Vec<Channe
             }),
         }
     }
+    channels.extend(stress.iter().map(|gauge| Channel {
+        group: "bodies",
+        owner: system.bodies[gauge.body].name.clone(),
+        quantity: "von_mises_peak",
+        kind: Kind::Stress,
+        width: 1,
+    }));
     channels
 }
 
@@ -95,17 +117,34 @@ fn channels(system: &System, hinges: &[usize], closures: &[usize]) -> Vec<Channe
 pub struct Recorder<'a> {
     hinges: Vec<usize>,
     gauges: Vec<ClosureGauge>,
+    stress: &'a [StressGauge],
+    /// Modal coordinates of each of these bodies at one output time after the other.
+    modal: Vec<Vec<f64>>,
     interrupted: Option<&'a AtomicBool>,
-    /// What was recorded so far.
-    pub history: History,
+    history: History,
 }
 
 impl<'a> Recorder<'a> {
-    /// A recorder of the loads that `scene` outputs; the run ends once `interrupted` is true.
+    /// A recorder of the loads that `scene` outputs or monitors, and of the stress that `stress` gauges; the run ends once `interrupted`
+    /// is true.
     #[must_use]
-    pub fn new(scene: &Scene, interrupted: Option<&'a AtomicBool>) -> Self {
-        let gauges = scene.closures.iter().map(|&i| ClosureGauge::new(&scene.system, i)).collect();
-        Self { hinges: scene.hinges.clone(), gauges, interrupted, history: History::of(scene) }
+    pub fn new(scene: &Scene, stress: &'a [StressGauge], interrupted: Option<&'a AtomicBool>) -> Self {
+        let (hinges, closures) = loaded(scene);
+        let gauges = closures.into_iter().map(|i| ClosureGauge::new(&scene.system, i)).collect();
+        Self { hinges, gauges, stress, modal: vec![Vec::new(); stress.len()], interrupted, history: History::of(scene, stress) }
+    }
+
+    /// What was recorded. Stress is evaluated now.
+    #[must_use]
+    pub fn finish(self) -> History {
+        let Self { stress, modal, mut history, .. } = self;
+        let (times, first) = (history.times.len(), history.channels.len() - stress.len());
+        for ((gauge, modal), values) in stress.iter().zip(&modal).zip(&mut history.values[first..]) {
+            let count = modal.len() / times.max(1);
+            // a body that retains no mode has no stress
+            values.extend((0..times).map(|i| gauge.read(&modal[i * count..(i + 1) * count])));
+        }
+        history
     }
 }
 
@@ -134,6 +173,9 @@ impl Observer for Recorder<'_> {
                     add(&load.as_slice()[3..]);
                 }
             }
+        }
+        for (gauge, modal) in self.stress.iter().zip(&mut self.modal) {
+            modal.extend_from_slice(&sample.state.modal_position[sample.system.bodies[gauge.body].modal_range()]);
         }
         if self.interrupted.is_some_and(|flag| flag.load(Ordering::Relaxed)) { Flow::Stop } else { Flow::Continue }
     }

@@ -1,11 +1,17 @@
-//! Work-precision plot: peak error against run time, both logarithmic, one curve per method and variant, the Pareto front ringed.
+//! Work-precision plot: peak error against run time, and beside it against evaluations, which are the same on every machine; all
+//! logarithmic, one curve per method and variant, the Pareto front of each panel ringed.
 
 use super::report::{PointReport, StudyReport};
+use plotters::coord::Shift;
+use plotters::drawing::DrawingAreaErrorKind;
 use plotters::prelude::*;
 use std::error::Error;
 
 /// Size of the picture.
-const SIZE: (u32, u32) = (900, 560);
+const SIZE: (u32, u32) = (1280, 560);
+/// Widths of the labels of the error, which stand at the left panel alone, and margin of the panels.
+const ERROR_LABELS: u32 = 76;
+const MARGIN: u32 = 12;
 /// Errors below this are drawn here.
 const FLOOR: f64 = 1e-16;
 /// Run times below this are drawn here (s).
@@ -21,83 +27,120 @@ const COLOURS: [RGBColor; 7] = [
     RGBColor(0, 0, 0),
 ];
 
+/// Where a point stands in a panel.
+#[derive(Debug, Clone, Copy)]
+struct Place {
+    cost: f64,
+    error: f64,
+    /// From the least to the largest cost.
+    spread: (f64, f64),
+    /// Whether it is on the panel's Pareto front.
+    ringed: bool,
+}
+
+/// One cost to draw the error against.
+struct Panel {
+    label: &'static str,
+    /// Of each point of the report; none for a gap.
+    places: Vec<Option<Place>>,
+    /// The first panel names the errors and the curves for both.
+    is_first: bool,
+}
+
 /// The plot as SVG.
 ///
 /// # Errors
 /// If there is no point to draw.
 pub fn svg(report: &StudyReport) -> Result<String, Box<dyn Error>> {
-    let places: Vec<Option<(f64, f64)>> = report.points.iter().map(place).collect();
-    if places.iter().all(Option::is_none) {
+    let points = || report.points.iter();
+    let panels = [
+        Panel { label: "run time (s), median", places: points().map(by_run_time).collect(), is_first: true },
+        Panel { label: "evaluations of the dynamics", places: points().map(by_evaluations).collect(), is_first: false },
+    ];
+    if panels[0].places.iter().all(Option::is_none) {
         return Err("no point has an error to draw".into());
     }
-    // whole decades
-    let range = |values: &mut dyn Iterator<Item = f64>| {
-        let (low, high) = values.fold((f64::INFINITY, 0.0_f64), |(l, h), x| (l.min(x), h.max(x)));
-        (10.0_f64.powf(low.log10().floor()), 10.0_f64.powf(high.log10().floor() + 1.0))
-    };
-    let (left, right) =
-        range(&mut report.points.iter().filter_map(|p| p.run_time_s).flat_map(|t| [t.min.max(FASTEST), t.max.max(FASTEST)]));
-    let (bottom, top) = range(&mut places.iter().flatten().map(|p| p.1));
     let mut text = String::new();
     {
         let root = SVGBackend::with_string(&mut text, SIZE).into_drawing_area();
         root.fill(&WHITE)?;
         let title = format!("{}: {} s, {} rounds", report.scene, report.duration_s, report.repeat);
-        let mut chart = ChartBuilder::on(&root)
-            .caption(title, ("sans-serif", 18))
-            .margin(12)
-            .x_label_area_size(44)
-            .y_label_area_size(76)
-            .build_cartesian_2d((left..right).log_scale(), (bottom..top).log_scale())?;
-        chart
-            .configure_mesh()
-            .x_desc("run time (s), median")
-            .y_desc("largest peak error of a load, relative")
-            .x_label_formatter(&|x| format!("{x:.0e}"))
-            .y_label_formatter(&|y| format!("{y:.0e}"))
-            .light_line_style(BLACK.mix(0.04))
-            .bold_line_style(BLACK.mix(0.12))
-            .draw()?;
-        let shades = [
-            (report.error_budget, GREEN.mix(0.07), format!("within {} %", 100.0 * report.error_budget)),
-            (report.reference.own_error.unwrap_or(0.0), BLACK.mix(0.1), "error of the reference".to_owned()),
-        ];
-        for (height, colour, label) in shades.into_iter().filter(|s| s.0 > bottom) {
-            let series = chart.draw_series([Rectangle::new([(left, bottom), (right, height.min(top))], colour.filled())])?;
-            series.label(label).legend(move |(x, y)| Rectangle::new([(x + 2, y - 5), (x + 14, y + 5)], colour.filled()));
+        let (left, right) = root.titled(&title, ("sans-serif", 18))?.split_horizontally((SIZE.0 + ERROR_LABELS) / 2);
+        draw(&left, report, &panels[0])?;
+        draw(&right, report, &panels[1])?;
+        root.present()?;
+    }
+    Ok(text)
+}
+
+/// Whole decades around values.
+fn decades(values: impl Iterator<Item = f64>) -> (f64, f64) {
+    let (low, high) = values.fold((f64::INFINITY, 0.0_f64), |(l, h), x| (l.min(x), h.max(x)));
+    (10.0_f64.powf(low.log10().floor()), 10.0_f64.powf(high.log10().floor() + 1.0))
+}
+
+fn draw<B: DrawingBackend>(
+    area: &DrawingArea<B, Shift>,
+    report: &StudyReport,
+    panel: &Panel,
+) -> Result<(), DrawingAreaErrorKind<B::ErrorType>> {
+    let Panel { label, places, is_first } = panel;
+    let (left, right) = decades(places.iter().flatten().flat_map(|p| [p.spread.0, p.spread.1]));
+    let (bottom, top) = decades(places.iter().flatten().map(|p| p.error));
+    let mut chart = ChartBuilder::on(area)
+        .margin(MARGIN)
+        .x_label_area_size(44)
+        .y_label_area_size(if *is_first { ERROR_LABELS } else { 0 })
+        .build_cartesian_2d((left..right).log_scale(), (bottom..top).log_scale())?;
+    chart
+        .configure_mesh()
+        .x_desc(*label)
+        .y_desc("largest peak error, relative")
+        .x_label_formatter(&|x| format!("{x:.0e}"))
+        .y_label_formatter(&|y| format!("{y:.0e}"))
+        .light_line_style(BLACK.mix(0.04))
+        .bold_line_style(BLACK.mix(0.12))
+        .draw()?;
+    let shades = [
+        (report.error_budget, GREEN.mix(0.07), format!("within {} %", 100.0 * report.error_budget)),
+        (report.reference.own_error.unwrap_or(0.0), BLACK.mix(0.1), "error of the reference".to_owned()),
+    ];
+    for (height, colour, label) in shades.into_iter().filter(|s| s.0 > bottom) {
+        let series = chart.draw_series([Rectangle::new([(left, bottom), (right, height.min(top))], colour.filled())])?;
+        series.label(label).legend(move |(x, y)| Rectangle::new([(x + 2, y - 5), (x + 14, y + 5)], colour.filled()));
+    }
+    for (number, (name, points)) in curves(report).into_iter().enumerate() {
+        let colour = COLOURS[number % COLOURS.len()];
+        // a gap ends a line, and the next begins behind it
+        let mut lines: Vec<Vec<(f64, f64)>> = vec![Vec::new()];
+        for &index in &points {
+            match (places[index], lines.last_mut()) {
+                (Some(place), Some(line)) => line.push((place.cost, place.error)),
+                _ => lines.push(Vec::new()),
+            }
         }
-        for (number, (name, points)) in curves(report).into_iter().enumerate() {
-            let colour = COLOURS[number % COLOURS.len()];
-            // a gap ends a line, and the next begins behind it
-            let mut lines: Vec<Vec<(f64, f64)>> = vec![Vec::new()];
-            for &index in &points {
-                match (places[index], lines.last_mut()) {
-                    (Some(at), Some(line)) => line.push(at),
-                    _ => lines.push(Vec::new()),
-                }
-            }
-            let gaps = points.iter().filter(|&&i| places[i].is_none()).count();
-            let label = if gaps > 0 { format!("{name} ({gaps} failed)") } else { name };
-            for line in lines.iter().filter(|line| line.len() > 1) {
-                chart.draw_series(LineSeries::new(line.iter().copied(), colour.stroke_width(2)))?;
-            }
-            // from the fastest to the slowest round
-            let spread = points.iter().filter_map(|&i| Some((report.points[i].run_time_s?, places[i]?.1)));
-            let spread = spread.map(|(t, y)| PathElement::new([(t.min.max(FASTEST), y), (t.max.max(FASTEST), y)], colour.mix(0.4)));
-            chart.draw_series(spread)?;
-            let dots = lines.concat();
-            if number < COLOURS.len() {
-                let series = chart.draw_series(dots.into_iter().map(|at| Circle::new(at, 3, colour.filled())))?;
-                series.label(label).legend(move |(x, y)| Circle::new((x + 8, y), 4, colour.filled()));
-            } else {
-                // the second turn of the colours has another shape
-                let series = chart.draw_series(dots.into_iter().map(|at| TriangleMarker::new(at, 5, colour.filled())))?;
-                series.label(label).legend(move |(x, y)| TriangleMarker::new((x + 8, y), 6, colour.filled()));
-            }
+        let gaps = points.iter().filter(|&&i| places[i].is_none()).count();
+        let label = if gaps > 0 { format!("{name} ({gaps} failed)") } else { name };
+        for line in lines.iter().filter(|line| line.len() > 1) {
+            chart.draw_series(LineSeries::new(line.iter().copied(), colour.stroke_width(2)))?;
         }
-        let ringed: Vec<_> = report.points.iter().zip(&places).filter(|(p, _)| p.pareto).filter_map(|(_, at)| *at).collect();
-        let series = chart.draw_series(ringed.into_iter().map(|at| Circle::new(at, 7, BLACK.stroke_width(1))))?;
-        series.label("Pareto front").legend(|(x, y)| Circle::new((x + 8, y), 6, BLACK.stroke_width(1)));
+        let spread = points.iter().filter_map(|&i| places[i]).filter(|p| p.spread.0 < p.spread.1);
+        let spread = spread.map(|p| PathElement::new([(p.spread.0, p.error), (p.spread.1, p.error)], colour.mix(0.4)));
+        chart.draw_series(spread)?;
+        let dots = lines.concat();
+        if number < COLOURS.len() {
+            let series = chart.draw_series(dots.into_iter().map(|at| Circle::new(at, 3, colour.filled())))?;
+            series.label(label).legend(move |(x, y)| Circle::new((x + 8, y), 4, colour.filled()));
+        } else {
+            // the second turn of the colours has another shape
+            let series = chart.draw_series(dots.into_iter().map(|at| TriangleMarker::new(at, 5, colour.filled())))?;
+            series.label(label).legend(move |(x, y)| TriangleMarker::new((x + 8, y), 6, colour.filled()));
+        }
+    }
+    let ringed = places.iter().flatten().filter(|p| p.ringed);
+    let series = chart.draw_series(ringed.map(|p| Circle::new((p.cost, p.error), 7, BLACK.stroke_width(1))))?;
+    series.label("Pareto front").legend(|(x, y)| Circle::new((x + 8, y), 6, BLACK.stroke_width(1)));
+    if *is_first {
         chart
             .configure_series_labels()
             .position(SeriesLabelPosition::LowerLeft)
@@ -105,14 +148,21 @@ pub fn svg(report: &StudyReport) -> Result<String, Box<dyn Error>> {
             .background_style(WHITE.mix(0.85))
             .border_style(BLACK.mix(0.3))
             .draw()?;
-        root.present()?;
     }
-    Ok(text)
+    Ok(())
 }
 
-/// Run time and error of a point that has both.
-fn place(point: &PointReport) -> Option<(f64, f64)> {
-    Some((point.run_time_s?.median.max(FASTEST), point.error?.peak.max(FLOOR)))
+/// Error against run time, from the fastest to the slowest round.
+fn by_run_time(point: &PointReport) -> Option<Place> {
+    let (time, error) = (point.run_time_s?, point.error?.peak.max(FLOOR));
+    let [cost, least, most] = [time.median, time.min, time.max].map(|t| t.max(FASTEST));
+    Some(Place { cost, error, spread: (least, most), ringed: point.pareto })
+}
+
+/// Error against evaluations, which are the same in every round.
+fn by_evaluations(point: &PointReport) -> Option<Place> {
+    let (cost, error) = (point.evaluations? as f64, point.error?.peak.max(FLOOR));
+    Some(Place { cost, error, spread: (cost, cost), ringed: point.pareto_evaluations })
 }
 
 /// Names of curves with the indices of their points, in order.

@@ -1,12 +1,13 @@
 //! What all points are compared with: the finest run, or a results file.
 
 use super::error::{compare, worst};
-use super::grid::{Grid, MOST_STEPS, Variant, least_steps};
+use super::grid::{Grid, MOST_STEPS, Subject, Variant, least_steps};
 use super::history::History;
 use super::runner::{Ended, StudyError, run_once};
 use super::state::{RunRecord, StateFile};
+use super::stress::StressGauges;
 use crate::model::ClosureMethod;
-use crate::scene::{Accuracy, Scene};
+use crate::scene::Accuracy;
 use serde::Serialize;
 use std::sync::atomic::AtomicBool;
 
@@ -18,6 +19,11 @@ const TIGHTEST: f64 = 1e-13;
 const WITHOUT_TOLERANCES: f64 = 1e-12;
 /// How much looser than the reference the run is that shows how far the reference itself can be trusted.
 const LOOSER: f64 = 10.0;
+
+/// How a results file comes to hold what it lacks.
+#[cfg(feature = "hdf5")]
+const WRITE_IT: &str =
+    "write it by pliant run --out from this scene, with what is missing among its output.hinges, output.closures or output.stress";
 
 /// What the errors are relative to.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -49,7 +55,7 @@ pub enum ReferenceSource {
 /// Ways to run the reference; the first that completes is taken.
 #[derive(Debug)]
 pub struct Candidates {
-    scenes: Vec<(String, Scene)>,
+    subjects: Vec<(String, Subject)>,
     tolerance: f64,
     /// What could not be as it should, in words.
     pub notes: Vec<String>,
@@ -74,15 +80,17 @@ impl Candidates {
             ..Variant::default()
         };
         let words = if flexible { ", all modes" } else { "" };
+        let mut gauges = StressGauges::default();
         let assemble = |variant: &Variant| variant.assemble(&base.source, base.duration);
-        let mut scenes = Vec::new();
+        let mut subject = |scene| Ok::<_, StudyError>(Subject { stress: gauges.of(&scene)?, scene });
+        let mut subjects = Vec::new();
         match assemble(&full) {
-            Ok(scene) => scenes.push((words.to_owned(), scene)),
+            Ok(scene) => subjects.push((words.to_owned(), subject(scene)?)),
             Err(error) => {
                 // a list in the scene, of damping ratios say, that holds for the scene's own modes only
-                let most = grid.variants.iter().max_by_key(|(_, scene)| scene.system.modal_count).map(|(v, _)| v.modes);
+                let most = grid.variants.iter().max_by_key(|(_, s)| s.scene.system.modal_count).map(|(v, _)| v.modes);
                 let variant = Variant { modes: most.flatten(), ..full.clone() };
-                scenes.push((", the most modes of any point".into(), assemble(&variant)?));
+                subjects.push((", the most modes of any point".into(), subject(assemble(&variant)?)?));
                 notes.push(format!("the reference retains no more modes than the points do, as all modes cannot be assembled: {error}"));
             }
         }
@@ -90,22 +98,23 @@ impl Candidates {
         if let (false, Some(method)) = (base.system.closures.is_empty(), embedding) {
             let variant = Variant { closure_method: Some(method.to_owned()), ..full };
             if let Ok(scene) = assemble(&variant) {
-                scenes.push((format!("{words}, {method}"), scene));
+                subjects.push((format!("{words}, {method}"), subject(scene)?));
             }
         }
-        Ok(Self { scenes, tolerance, notes })
+        Ok(Self { subjects, tolerance, notes })
     }
 
     /// What decides the reference's numbers.
     fn identity(&self) -> String {
-        let scenes: Vec<_> = self.scenes.iter().map(|(words, scene)| format!("{words} {}", scene.system.modal_count)).collect();
-        format!("run at {:e}: {}", self.tolerance, scenes.join("; "))
+        let subjects: Vec<_> = self.subjects.iter().map(|(words, s)| format!("{words} {}", s.scene.system.modal_count)).collect();
+        format!("run at {:e}: {}", self.tolerance, subjects.join("; "))
     }
 
     /// The first way that completes: what it was, its history, and how long it took.
-    fn run(&self, interrupted: &AtomicBool) -> Result<(String, &Scene, &'static str, Ended), StudyError> {
+    fn run(&self, interrupted: &AtomicBool) -> Result<(String, &Subject, &'static str, Ended), StudyError> {
         let mut failures = Vec::new();
-        for (words, scene) in &self.scenes {
+        for (words, subject) in &self.subjects {
+            let scene = &subject.scene;
             for integrator in ["dormand_prince", "rosenbrock_w"] {
                 let accuracy = Accuracy::Tolerance(self.tolerance);
                 let steps = least_steps(scene, integrator, accuracy, scene.duration.unwrap_or(0.0));
@@ -113,9 +122,9 @@ impl Candidates {
                     failures.push(format!("{integrator}{words}: stability would ask for {steps:.1e} steps"));
                     continue;
                 }
-                let ended = run_once(scene, integrator, accuracy, interrupted)?;
+                let ended = run_once(subject, integrator, accuracy, interrupted)?;
                 match &ended.failure {
-                    None => return Ok((format!("{integrator} at {:e}{words}", self.tolerance), scene, integrator, ended)),
+                    None => return Ok((format!("{integrator} at {:e}{words}", self.tolerance), subject, integrator, ended)),
                     Some(failure) => failures.push(format!("{integrator}{words}: {failure}")),
                 }
             }
@@ -146,16 +155,16 @@ impl ReferenceSource {
     /// The reference and its history; a run that the state file does not know yet is kept there.
     ///
     /// # Errors
-    /// If no way to run it completes, it is interrupted, or holds no loads.
+    /// If no way to run it completes, it is interrupted, or nothing happens in it.
     pub fn obtain(&self, key: &str, state: &mut StateFile, interrupted: &AtomicBool) -> Result<(Reference, History), StudyError> {
         let (reference, history) = match self {
             Self::File { path, history, .. } => (Reference { what: path.clone(), own_error: None, wall_s: None }, History::clone(history)),
             Self::Run(candidates) => {
-                let (what, scene, integrator, ended) = candidates.run(interrupted)?;
+                let (what, subject, integrator, ended) = candidates.run(interrupted)?;
                 if let Some(record) = state.runs(key).first() {
                     (reference_of(record), ended.history)
                 } else {
-                    let looser = run_once(scene, integrator, Accuracy::Tolerance(LOOSER * candidates.tolerance), interrupted)?;
+                    let looser = run_once(subject, integrator, Accuracy::Tolerance(LOOSER * candidates.tolerance), interrupted)?;
                     let errors = compare(&ended.history, &looser.history).unwrap_or_default();
                     let record = ended.record(key.to_owned(), what, errors);
                     let reference = reference_of(&record);
@@ -175,23 +184,26 @@ fn reference_of(record: &RunRecord) -> Reference {
     Reference { what: record.what.clone(), own_error: worst(&record.errors).map(|e| e.peak), wall_s: Some(record.wall_s) }
 }
 
-/// The histories of a results file at the output times of a study of `scene`.
+/// The histories of a results file at the output times of the study `grid`.
 ///
 /// # Errors
 /// If the file cannot be read, or lacks a channel or an output time.
 #[cfg(feature = "hdf5")]
-pub fn read(path: &std::path::Path, scene: &Scene) -> Result<ReferenceSource, StudyError> {
+pub fn read(path: &std::path::Path, grid: &Grid) -> Result<ReferenceSource, StudyError> {
     use super::error::same_time;
     use crate::io::results_file::{escape, read_series};
     use sha2::{Digest, Sha256};
     let fail = |message: String| StudyError::File { path: path.display().to_string(), message };
     let bytes = std::fs::read(path).map_err(|e| fail(e.to_string()))?;
     let digest: String = Sha256::digest(&bytes).iter().map(|b| format!("{b:02x}")).collect();
-    let mut history = History::of(scene);
+    let (scene, mut history) = (&grid.base, grid.history());
     let mut wanted = vec![("time".to_owned(), None)];
     let path_of = |c: &super::history::Channel| format!("{}/{}/{}", c.group, escape(&c.owner), c.quantity);
     wanted.extend(history.channels.iter().map(|c| (path_of(c), (c.width > 1).then_some(c.width))));
-    let mut series = read_series(path, &wanted).map_err(|e| fail(e.to_string()))?;
+    let mut series = read_series(path, &wanted).map_err(|e| {
+        let absent = e.to_string().ends_with("is not in it");
+        fail(if absent { format!("{e}; {WRITE_IT}") } else { e.to_string() })
+    })?;
     let stored = series.remove(0);
     let times = output_times(scene);
     let span = times.last().copied().unwrap_or(0.0);
@@ -221,7 +233,7 @@ pub fn read(path: &std::path::Path, scene: &Scene) -> Result<ReferenceSource, St
 
 /// Output times as the time loop takes them.
 #[cfg(feature = "hdf5")]
-fn output_times(scene: &Scene) -> Vec<f64> {
+fn output_times(scene: &crate::scene::Scene) -> Vec<f64> {
     let (start, rate) = (scene.state.time, scene.rate_hz);
     let end = start + scene.duration.unwrap_or(0.0);
     let multiples = (0_u64..).map(|k| start + k as f64 / rate).take_while(|t| *t < end - 1e-9 / rate);

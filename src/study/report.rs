@@ -2,7 +2,6 @@
 
 use super::error::{ChannelError, worst};
 use super::grid::{Grid, Point};
-use super::history::History;
 use super::pareto::{Figures, cheapest, cheapest_where, front};
 use super::reference::Reference;
 use super::runner::Finished;
@@ -55,6 +54,8 @@ pub struct PointReport {
     pub failure: Option<String>,
     /// True on the Pareto front of run time and peak error.
     pub pareto: bool,
+    /// True on the Pareto front of evaluations and peak error, which no machine decides.
+    pub pareto_evaluations: bool,
     /// True if the peak error of every channel is within the budget.
     pub meets: bool,
 }
@@ -85,6 +86,8 @@ pub struct StudyReport {
     pub complete: bool,
     /// What errors are relative to.
     pub reference: Reference,
+    /// Bodies whose largest von Mises stress is compared beside the loads.
+    pub stress_bodies: Vec<String>,
     /// Channels in which nothing happens, which have no errors.
     pub silent: Vec<String>,
     /// Everything that was run, curve by curve from coarse to fine.
@@ -102,7 +105,7 @@ impl StudyReport {
     #[must_use]
     pub fn new(grid: &Grid, finished: &Finished, repeat: usize, error_budget: f64, notes: Vec<String>) -> Self {
         let base = &grid.base;
-        let names: Vec<String> = History::of(base).channels.iter().map(super::history::Channel::name).collect();
+        let names: Vec<String> = grid.history().channels.iter().map(super::history::Channel::name).collect();
         let mut points: Vec<PointReport> = grid
             .points
             .iter()
@@ -114,7 +117,7 @@ impl StudyReport {
                 let named = names.iter().zip(errors).filter_map(|(name, e)| e.map(|e| (name.clone(), e)));
                 let error = worst(errors);
                 PointReport {
-                    retained_modes: grid.variants[point.scene].1.system.modal_count,
+                    retained_modes: grid.variants[point.scene].1.scene.system.modal_count,
                     point: point.clone(),
                     run_time_s: first.and_then(|_| Timing::of(runs.iter().map(|r| r.wall_s).collect())),
                     steps: first.map(|r| r.steps),
@@ -125,6 +128,7 @@ impl StudyReport {
                     meets: error.is_some_and(|e| e.peak <= error_budget),
                     error,
                     pareto: false,
+                    pareto_evaluations: false,
                 }
             })
             .collect();
@@ -133,6 +137,9 @@ impl StudyReport {
         let floor = finished.reference.own_error.unwrap_or(0.0);
         let known: Vec<Figures> = figures.iter().map(|f| f.map(|(cost, error)| (cost, error.max(floor)))).collect();
         front(&known).into_iter().for_each(|i| points[i].pareto = true);
+        let counted = |(p, f): (&PointReport, &Figures)| f.and_then(|(_, error)| Some((p.evaluations? as f64, error)));
+        let counted: Vec<Figures> = points.iter().zip(&known).map(counted).collect();
+        front(&counted).into_iter().for_each(|i| points[i].pareto_evaluations = true);
         let found = cheapest(&figures, error_budget);
         let lines = found.map(|point| Cheapest { point, lines: scene_lines(base, &grid.points[point]) });
         let some_errors = finished.runs.iter().flatten().find(|r| r.failure.is_none()).map_or(&[][..], |r| &r.errors);
@@ -144,6 +151,7 @@ impl StudyReport {
             error_budget,
             complete: !finished.interrupted,
             reference: finished.reference.clone(),
+            stress_bodies: grid.stress().iter().map(|g| base.system.bodies[g.body].name.clone()).collect(),
             silent: names.iter().zip(some_errors).filter(|(_, e)| e.is_none()).map(|(n, _)| n.clone()).collect(),
             proposals: proposals(&points, &figures, error_budget),
             points,
@@ -178,6 +186,7 @@ impl StudyReport {
             "peak_error",
             "rms_error",
             "pareto",
+            "pareto_evaluations",
             "failure",
         ])?;
         for p in &self.points {
@@ -204,7 +213,8 @@ impl StudyReport {
                 text(some(p.evaluations.as_ref())),
             ];
             let mut row = |channel: &str, peak: String, rms: String| {
-                let end = [channel.to_owned(), peak, rms, p.pareto.to_string(), p.failure.clone().unwrap_or_default()];
+                let fronts = [p.pareto, p.pareto_evaluations].map(|on| on.to_string());
+                let end = [&[channel.to_owned(), peak, rms], &fronts[..], &[p.failure.clone().unwrap_or_default()]].concat();
                 writer.write_record(setting.iter().chain(&end))
             };
             if p.failure.is_some() {

@@ -1,10 +1,11 @@
 //! Runs everything in rounds: each round runs every point once, in a shuffled order, so that the noise of the machine meets all alike.
 
 use super::error::{Gap, compare};
-use super::grid::Grid;
+use super::grid::{Grid, Subject};
 use super::history::{History, Recorder};
 use super::reference::{Reference, ReferenceSource};
 use super::state::{RunRecord, StateError, StateFile};
+use super::stress::StressError;
 use crate::integrate::{Outcome, Settings, Summary, simulate};
 use crate::scene::{Accuracy, Scene, SceneError};
 use sha2::{Digest, Sha256};
@@ -21,8 +22,8 @@ pub enum StudyError {
         /// One reason for each way.
         failures: String,
     },
-    /// The reference holds no loads.
-    #[error("every load that the scene outputs is zero, so that no error is relative to anything; output other hinges")]
+    /// Nothing happens in the reference.
+    #[error("every load and stress that is compared is zero, so that no error is relative to anything; output other hinges")]
     Silent,
     /// A results file that cannot be the reference.
     #[error("--reference {path}: {message}")]
@@ -38,6 +39,9 @@ pub enum StudyError {
     /// A scene that cannot be assembled.
     #[error(transparent)]
     Scene(#[from] SceneError),
+    /// Stress that cannot be compared.
+    #[error(transparent)]
+    Stress(#[from] StressError),
     /// The state file.
     #[error(transparent)]
     State(#[from] StateError),
@@ -72,14 +76,15 @@ impl Ended {
     }
 }
 
-/// Runs a scene once and times it, the recording of loads at the output times included.
+/// Runs a scene once and times it, the recording of loads at the output times included, the evaluation of stress not.
 ///
 /// # Errors
 /// [`StudyError::Interrupted`] if it was.
-pub fn run_once(scene: &Scene, integrator: &str, accuracy: Accuracy, interrupted: &AtomicBool) -> Result<Ended, StudyError> {
+pub fn run_once(subject: &Subject, integrator: &str, accuracy: Accuracy, interrupted: &AtomicBool) -> Result<Ended, StudyError> {
+    let Subject { scene, stress } = subject;
     let method = scene.method_at(integrator, accuracy).unwrap_or(scene.method);
     let settings = Settings { duration: scene.duration.unwrap_or(0.0), method, rate_hz: scene.rate_hz };
-    let mut recorder = Recorder::new(scene, Some(interrupted));
+    let mut recorder = Recorder::new(scene, stress, Some(interrupted));
     let started = Instant::now();
     let summary = simulate(&scene.system, &scene.state, &settings, &mut [&mut recorder]);
     let wall = started.elapsed();
@@ -88,7 +93,7 @@ pub fn run_once(scene: &Scene, integrator: &str, accuracy: Accuracy, interrupted
         Outcome::Stopped => return Err(StudyError::Interrupted),
         Outcome::Failed(failure) => Some(failure.to_string()),
     };
-    Ok(Ended { history: recorder.history, wall, summary, failure })
+    Ok(Ended { history: recorder.finish(), wall, summary, failure })
 }
 
 /// What a study has found, finished or not.
@@ -118,7 +123,8 @@ pub fn run(
     interrupted: &AtomicBool,
     watch: &mut dyn Watch,
 ) -> Result<Finished, StudyError> {
-    let identity = format!("{}\n{}", scene_identity(&grid.base), source.identity());
+    let channels: Vec<String> = grid.history().channels.iter().map(super::history::Channel::name).collect();
+    let identity = format!("{}\n{}\n{channels:?}", scene_identity(&grid.base), source.identity());
     let key_of = |what: &str| {
         let digest = Sha256::digest(format!("{identity}\n{what}"));
         digest.iter().map(|b| format!("{b:02x}")).collect::<String>()

@@ -31,9 +31,9 @@ pub struct LoadDifference {
     pub moment: Option<f64>,
     /// Of the peak force.
     pub force: Option<f64>,
-    /// Of the moment over the output times, if it is an output.
+    /// Of the moment over the output times, if it is an output or monitored.
     pub moment_history: Option<ChannelError>,
-    /// Of the force over the output times, if it is an output; of a gear, of what it exerts.
+    /// Of the force over the output times, if it is an output or monitored; of a gear, of what it exerts.
     pub force_history: Option<ChannelError>,
 }
 
