@@ -18,7 +18,8 @@ fn four_bar() -> String {
 }
 
 fn pliant(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_pliant")).args(arguments).stdin(Stdio::null()).output().unwrap()
+    let mut command = Command::new(env!("CARGO_BIN_EXE_pliant"));
+    command.args(arguments).env("HDF5_USE_FILE_LOCKING", "FALSE").stdin(Stdio::null()).output().unwrap()
 }
 
 fn text(bytes: &[u8]) -> String {
@@ -169,7 +170,7 @@ fn elements(xml: &str) -> Vec<(String, String)> {
 }
 
 #[test]
-fn the_plot_is_xml_with_one_line_per_curve() {
+fn the_plot_is_xml_with_one_line_per_curve_and_panel() {
     let folder = tempfile::tempdir().unwrap();
     let svg = folder.path().join("plot.svg");
     quick(&["--svg", svg.to_str().unwrap()]);
@@ -177,10 +178,90 @@ fn the_plot_is_xml_with_one_line_per_curve() {
     let elements = elements(&xml);
     assert_eq!(elements[0].0, "svg");
     let lines = elements.iter().filter(|(name, tag)| name == "polyline" && tag.contains("stroke-width=\"2\"")).count();
-    assert_eq!(lines, 3, "{xml}");
-    for label in ["dormand_prince", "rosenbrock_w", "rk4", "Pareto front", "run time (s)"] {
+    assert_eq!(lines, 2 * 3, "{xml}");
+    for label in ["dormand_prince", "rosenbrock_w", "rk4", "Pareto front", "run time (s)", "evaluations of the dynamics"] {
         assert!(xml.contains(label), "{label}");
     }
+}
+
+/// The report of one `pliant run` of a scene.
+fn run(scene: &str, more: &[&str]) -> Value {
+    let done = pliant(&[&["run", scene, "--viewer", "none", "--json"], more].concat());
+    assert_eq!(done.status.code(), Some(0), "{}", text(&done.stderr));
+    serde_json::from_slice(&done.stdout).unwrap()
+}
+
+/// The double pendulum with other lines put in for some of its own.
+fn changed_pendulum(folder: &Path, changes: &[(&str, &str)]) -> String {
+    let mut scene = fs::read_to_string(pendulum()).unwrap();
+    for (old, new) in changes {
+        assert!(scene.contains(old), "{old}");
+        scene = scene.replace(old, new);
+    }
+    let path = folder.join("scene.toml");
+    fs::write(&path, scene).unwrap();
+    path.display().to_string()
+}
+
+#[test]
+fn evaluations_are_those_that_runs_report() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = changed_pendulum(folder.path(), &[("= 1e-12", "= 1e-5"), ("= 1e-13", "= 1e-6")]);
+    let csv = folder.path().join("out.csv");
+    // without a step, rk4 takes one per output time
+    let lists = ["--duration", "0.5", "--repeat", "1", "--tolerances", "1e-5", "--steps", "0.016666666666666666"];
+    let arguments = [&[scene.as_str()], &lists[..], &["--csv", csv.to_str().unwrap()]].concat();
+    let report = study(&arguments);
+    let table = text(&pliant(&[&["study"], &arguments[..]].concat()).stdout);
+    let rows = fs::read_to_string(&csv).unwrap();
+    assert_eq!(rows.lines().next().unwrap().split(',').nth(14), Some("evaluations"));
+    for point in report["points"].as_array().unwrap() {
+        let integrator = point["integrator"].as_str().unwrap();
+        let alone = run(&scene, &["--duration", "0.5", "--integrator", integrator]);
+        assert_eq!(point["steps"], alone["steps"], "{integrator}");
+        let [steps, own, evaluations] = [&point["steps"], &point["evaluations"], &alone["evaluations"]].map(|n| n.as_u64().unwrap());
+        // a run looks at the local error of every eighth step for its report, where there is one
+        let looks = if integrator == "rk4" { 0 } else { steps / 8 };
+        assert_eq!(own + looks, evaluations, "{integrator}");
+        let own = own.to_string();
+        let row = rows.lines().find(|l| l.starts_with(&format!("{integrator},"))).unwrap();
+        assert_eq!(row.split(',').nth(14), Some(own.as_str()), "{row}");
+        let line = table.lines().find(|l| l.starts_with("  ") && l.contains(&format!(" {integrator} "))).unwrap();
+        assert!(line.split_whitespace().any(|cell| cell == own), "{table}");
+    }
+}
+
+#[test]
+fn nothing_beats_the_front_of_evaluations_and_all_else_is_beaten() {
+    let report = quick(&[]);
+    let points = report["points"].as_array().unwrap();
+    let place = |p: &Value| (p["evaluations"].as_u64().unwrap(), p["error"]["peak"].as_f64().unwrap());
+    let beats = |a: &Value, b: &Value| place(a) != place(b) && place(a).0 <= place(b).0 && place(a).1 <= place(b).1;
+    for p in points {
+        assert_eq!(p["pareto_evaluations"], !points.iter().any(|other| beats(other, p)), "{p}");
+    }
+}
+
+#[test]
+fn the_table_shows_every_channel_along_the_front() {
+    let report = quick(&[]);
+    let scene = pendulum();
+    let table = text(&pliant(&[&["study", &scene], &QUICK[..]].concat()).stdout);
+    let (_, channels) = table.split_once("peak / rms error of each channel").unwrap();
+    for (name, _) in report["points"][0]["channels"].as_object().unwrap() {
+        let line = channels.lines().find(|l| l.trim_start().starts_with(name.as_str())).unwrap();
+        assert!(line.contains("e-") && line.contains(" / "), "{line}");
+    }
+}
+
+#[test]
+fn loads_that_are_only_monitored_are_compared_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let monitor = "[output]\nhinges = [\"elbow\"]\n\n[[monitor]]\nhinge = \"shoulder\"\n\n[simulation]";
+    let scene = changed_pendulum(folder.path(), &[("[simulation]", monitor)]);
+    let report = study(&[&[scene.as_str()], &QUICK[..]].concat());
+    assert_eq!(report["points"][0]["channels"], quick(&[])["points"][0]["channels"].clone());
+    assert!(report["points"][0]["channels"]["shoulder force"]["peak"].is_number(), "{report}");
 }
 
 fn lines_of(path: &Path) -> Vec<String> {
@@ -382,6 +463,105 @@ mod flexible {
         );
         let lines = report["cheapest"]["lines"].to_string();
         assert!(lines.contains("modes = { count = ") && lines.contains("inertia_order = "), "{lines}");
+    }
+
+    /// The hub with two panels with other lines put in for some of its own.
+    fn changed_hub(folder: &Path, changes: &[(&str, &str)]) -> String {
+        let mut scene = fs::read_to_string(hub()).unwrap().replace("../../modes", root().join("modes").to_str().unwrap());
+        for (old, new) in changes {
+            assert!(scene.contains(old), "{old}");
+            scene = scene.replace(old, new);
+        }
+        let path = folder.join("scene.toml");
+        fs::write(&path, scene).unwrap();
+        path.display().to_string()
+    }
+
+    const MONITOR: &str = "[[monitor]]\nbody = \"panel_left\"\nstress_limit = 2.5e4";
+
+    fn history(file: &Path, name: &str) -> Vec<f64> {
+        hdf5::File::open(file).unwrap().dataset(name).unwrap().read_raw::<f64>().unwrap()
+    }
+
+    #[test]
+    fn the_stress_error_of_few_modes_is_the_difference_of_two_runs() {
+        let folder = tempfile::tempdir().unwrap();
+        let tolerances = "[simulation]\nrelative_tolerance = 1e-4\nabsolute_tolerance = 1e-7";
+        let scene = changed_hub(folder.path(), &[("[simulation]", tolerances)]);
+        let files = ["all.h5", "few.h5"].map(|name| folder.path().join(name));
+        let how = ["--duration", "4", "--integrator", "rosenbrock_w"];
+        run(&scene, &[&how[..], &["--out", files[0].to_str().unwrap()]].concat());
+        let alone = run(&scene, &[&how[..], &["--modes", "3", "--out", files[1].to_str().unwrap()]].concat());
+        let [all, few] = [0, 1].map(|i| history(&files[i], "bodies/panel_left/von_mises_peak"));
+        assert!(all.len() == 121 && few.len() == all.len());
+        let largest = all.iter().fold(0.0_f64, |m, x| m.max(*x));
+        let differences: Vec<f64> = all.iter().zip(&few).map(|(a, b)| (a - b).abs() / largest).collect();
+        let peak = differences.iter().fold(0.0_f64, |m, x| m.max(*x));
+        let rms = (differences.iter().map(|x| x * x).sum::<f64>() / all.len() as f64).sqrt();
+
+        let lists = ["--duration", "4", "--repeat", "1", "--integrators", "rosenbrock_w", "--tolerances", "1e-4", "--modes", "0,3"];
+        let csv = folder.path().join("out.csv");
+        let more = ["--reference", files[0].to_str().unwrap(), "--csv", csv.to_str().unwrap(), "--error", "50%"];
+        let report = study(&[&[scene.as_str()], &lists[..], &more[..]].concat());
+        assert_eq!(report["stress_bodies"], serde_json::json!(["panel_left"]));
+        let [none, point] = [0, 1].map(|i| &report["points"][i]);
+        let found = &point["channels"]["panel_left stress"];
+        // the same numbers in both: sums of 121 squares may differ by as many roundings
+        let bound = all.len() as f64 * f64::EPSILON;
+        for (what, expected) in [("peak", peak), ("rms", rms)] {
+            let found = found[what].as_f64().unwrap();
+            assert!(expected > 1e-5 && (found / expected - 1.0).abs() < bound, "{what}: {found} {expected}");
+        }
+        // the largest error is the largest of all channels, and a body without modes has no stress, so that it misses all of it
+        let channels = |p: &Value| p["channels"].as_object().unwrap().values().map(|c| c["peak"].as_f64().unwrap()).fold(0.0, f64::max);
+        assert_eq!(point["error"]["peak"].as_f64().unwrap(), channels(point));
+        assert_eq!(none["channels"]["panel_left stress"]["peak"], 1.0);
+        assert!(none["error"]["peak"] == 1.0 && none["meets"] == false && point["meets"] == true, "{none}");
+        assert!(alone["peaks"]["bodies"]["panel_left"]["von_mises"].as_f64().unwrap() >= few.iter().fold(0.0, |m, x| x.max(m)));
+        let rows = fs::read_to_string(&csv).unwrap();
+        let row = rows.lines().find(|l| l.starts_with("rosenbrock_w,0.0001,,3,") && l.contains(",panel_left stress,")).unwrap();
+        assert!(row.contains(&format!(",{},", found["peak"])), "{row}");
+    }
+
+    #[test]
+    fn stress_is_compared_where_the_scene_names_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let bodies = |changes: &[(&str, &str)]| {
+            let scene = changed_hub(folder.path(), changes);
+            let lists = ["--duration", "3", "--repeat", "1", "--integrators", "dormand_prince", "--tolerances", "1e-4", "--modes", "3"];
+            let report = study(&[&[scene.as_str()], &lists[..]].concat());
+            let channels = report["points"][0]["channels"].as_object().unwrap().clone();
+            let stressed: Vec<String> = channels.keys().filter_map(|name| name.strip_suffix(" stress")).map(str::to_owned).collect();
+            assert_eq!(report["stress_bodies"], serde_json::json!(stressed));
+            stressed
+        };
+        assert_eq!(bodies(&[]), ["panel_left"]);
+        assert_eq!(bodies(&[("[output]", "[output]\nstress = [\"panel_right\"]")]), ["panel_left", "panel_right"]);
+        // a run evaluates the stress of all bodies by default; what nobody asks for is not compared
+        assert!(bodies(&[(MONITOR, "")]).is_empty());
+    }
+
+    #[test]
+    fn stress_that_is_not_there_is_refused_by_name() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("run.h5");
+        let scene = changed_hub(folder.path(), &[(MONITOR, ""), ("[output]", "[output]\nstress = []")]);
+        run(&scene, &["--duration", "1", "--out", file.to_str().unwrap()]);
+        let refused = |scene: &str, more: &[&str]| {
+            let done = pliant(&[&["study", scene, "--duration", "1"], more].concat());
+            assert_eq!(done.status.code(), Some(2), "{}", text(&done.stderr));
+            text(&done.stderr)
+        };
+        let message = refused(&hub(), &["--reference", file.to_str().unwrap()]);
+        for part in ["--reference", "run.h5", "bodies/panel_left/von_mises_peak is not in it", "output.stress"] {
+            assert!(message.contains(part), "no \"{part}\" in: {message}");
+        }
+        let (from, to) = (root().join("modes/panel_cantilever.h5"), root().join("tests/data/cantilever.h5"));
+        let scene = changed_hub(folder.path(), &[(from.to_str().unwrap(), to.to_str().unwrap())]);
+        let message = refused(&scene, &[]);
+        for part in ["scene.toml", "stress of body \"panel_left\"", "no stress modes", "drop the stress monitor"] {
+            assert!(message.contains(part), "no \"{part}\" in: {message}");
+        }
     }
 
     #[test]

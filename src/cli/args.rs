@@ -20,7 +20,7 @@ pub enum Command {
     Run(RunArguments),
     /// Evaluate a scene once, at its initial state: accelerations, hinge loads, energies
     Eval(EvalArguments),
-    /// Run a scene over integrators, tolerances or steps, mode counts, inertia orders: error of every load against run time
+    /// Run a scene over integrators, tolerances or steps, mode counts, inertia orders: error of every load and monitored stress against run time
     Study(StudyArguments),
     /// Run a scene for many values of its keys, on all cores: envelope of every load with concurrent components, case and time
     Sweep(SweepArguments),
@@ -309,10 +309,10 @@ pub struct StudyArguments {
     /// Simulated time (s) instead of the scene's
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub duration: Option<f64>,
-    /// Results file to compare with [default: a run with all modes, a hundred times tighter than the tightest tolerance]
+    /// Results file to compare with, with all loads and stresses of the scene [default: a run with all modes, a hundred times tighter than the tightest tolerance]
     #[arg(long, value_name = "FILE.h5")]
     pub reference: Option<PathBuf>,
-    /// Error budget: largest peak error of a load, as 1% or 0.01
+    /// Error budget: largest peak error of a load or monitored stress, as 1% or 0.01
     #[arg(long, value_name = "X", default_value = "1%", value_parser = budget, allow_hyphen_values = true)]
     pub error: f64,
     /// Rounds; each runs every setting once, in another order
@@ -324,7 +324,7 @@ pub struct StudyArguments {
     /// Write every channel of every setting to this table
     #[arg(long, value_name = "FILE")]
     pub csv: Option<PathBuf>,
-    /// Draw error against run time to this picture
+    /// Draw error against run time, and against evaluations of the dynamics, to this picture (SVG)
     #[arg(long, value_name = "FILE")]
     pub svg: Option<PathBuf>,
     /// Print one JSON object instead of tables

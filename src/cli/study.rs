@@ -281,7 +281,10 @@ fn write_channels(report: &StudyReport, output: &mut dyn Write) -> io::Result<()
         table.row(std::iter::once(name.to_owned()).chain(taken.iter().map(cell)));
     }
     let thinned = if shown < front.len() { format!(", {shown} of its {} settings", front.len()) } else { String::new() };
-    writeln!(output, "\npeak / rms error of each channel against run time, along the Pareto front{thinned} (all others by --csv or --json):")?;
+    writeln!(
+        output,
+        "\npeak / rms error of each channel against run time, along the Pareto front{thinned} (all others by --csv or --json):"
+    )?;
     table.write(output)
 }
 

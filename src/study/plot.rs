@@ -89,6 +89,8 @@ fn draw<B: DrawingBackend>(
     let (bottom, top) = decades(places.iter().flatten().map(|p| p.error));
     let mut chart = ChartBuilder::on(area)
         .margin(MARGIN)
+        // the last label of a panel stands clear of the first of the next
+        .margin_right(2 * MARGIN)
         .x_label_area_size(44)
         .y_label_area_size(if *is_first { ERROR_LABELS } else { 0 })
         .build_cartesian_2d((left..right).log_scale(), (bottom..top).log_scale())?;
@@ -96,6 +98,7 @@ fn draw<B: DrawingBackend>(
         .configure_mesh()
         .x_desc(*label)
         .y_desc("largest peak error, relative")
+        .axis_desc_style(("sans-serif", 15))
         .x_label_formatter(&|x| format!("{x:.0e}"))
         .y_label_formatter(&|y| format!("{y:.0e}"))
         .light_line_style(BLACK.mix(0.04))

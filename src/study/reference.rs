@@ -191,7 +191,7 @@ fn reference_of(record: &RunRecord) -> Reference {
 #[cfg(feature = "hdf5")]
 pub fn read(path: &std::path::Path, grid: &Grid) -> Result<ReferenceSource, StudyError> {
     use super::error::same_time;
-    use crate::io::results_file::{escape, read_series};
+    use crate::io::results_file::{ResultsError, escape, read_series};
     use sha2::{Digest, Sha256};
     let fail = |message: String| StudyError::File { path: path.display().to_string(), message };
     let bytes = std::fs::read(path).map_err(|e| fail(e.to_string()))?;
@@ -200,9 +200,9 @@ pub fn read(path: &std::path::Path, grid: &Grid) -> Result<ReferenceSource, Stud
     let mut wanted = vec![("time".to_owned(), None)];
     let path_of = |c: &super::history::Channel| format!("{}/{}/{}", c.group, escape(&c.owner), c.quantity);
     wanted.extend(history.channels.iter().map(|c| (path_of(c), (c.width > 1).then_some(c.width))));
-    let mut series = read_series(path, &wanted).map_err(|e| {
-        let absent = e.to_string().ends_with("is not in it");
-        fail(if absent { format!("{e}; {WRITE_IT}") } else { e.to_string() })
+    let mut series = read_series(path, &wanted).map_err(|e| match e {
+        ResultsError::Read { cause } if cause.ends_with("is not in it") => fail(format!("{cause}; {WRITE_IT}")),
+        other => fail(other.to_string()),
     })?;
     let stored = series.remove(0);
     let times = output_times(scene);
