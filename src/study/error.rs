@@ -155,6 +155,24 @@ mod tests {
     }
 
     #[test]
+    fn a_stress_is_rounding_beside_forces_on_a_square_metre() {
+        let mut reference = history([0.0; 6], [10.0; 6]);
+        reference.channels.push(Channel {
+            group: "bodies",
+            owner: "panel".into(),
+            quantity: "von_mises_peak",
+            kind: Kind::Stress,
+            width: 1,
+        });
+        let largest_force = 300.0_f64.sqrt();
+        for (share, counts) in [(0.5, false), (2.0, true)] {
+            reference.values.truncate(2);
+            reference.values.push(vec![0.0, share * SILENT * largest_force]);
+            assert_eq!(scales(&reference)[2].is_some(), counts);
+        }
+    }
+
+    #[test]
     fn what_cannot_be_compared_is_a_gap_with_its_reason() {
         let reference = history([1.0; 6], [1.0; 6]);
         let gap = |run: &History| compare(&reference, run).unwrap_err().to_string();
