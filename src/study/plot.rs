@@ -146,13 +146,34 @@ fn draw<B: DrawingBackend>(
     if *is_first {
         chart
             .configure_series_labels()
-            .position(SeriesLabelPosition::LowerLeft)
+            .position(emptiest_corner(places, (left, right), (bottom, top), curves(report).len() + 3))
             .label_font(("sans-serif", 13))
             .background_style(WHITE.mix(0.85))
             .border_style(BLACK.mix(0.3))
             .draw()?;
     }
     Ok(())
+}
+
+/// The corner with the fewest points in the part of a panel that a legend of so many rows covers.
+fn emptiest_corner(places: &[Option<Place>], costs: (f64, f64), errors: (f64, f64), rows: usize) -> SeriesLabelPosition {
+    let share = |x: f64, (low, high): (f64, f64)| (x / low).ln() / (high / low).ln();
+    // of half the picture and its height, less labels; a row takes 15 points, the frame some more
+    let (width, height) = (0.48, (15 * rows + 25) as f64 / 466.0);
+    let corners = [
+        (SeriesLabelPosition::LowerLeft, false, false),
+        (SeriesLabelPosition::UpperRight, true, true),
+        (SeriesLabelPosition::LowerRight, true, false),
+        (SeriesLabelPosition::UpperLeft, false, true),
+    ];
+    let covered = |right: bool, upper: bool| {
+        let inside = |p: &&Place| {
+            let (x, y) = (share(p.cost, costs), share(p.error, errors));
+            (if right { 1.0 - x } else { x }) < width && (if upper { 1.0 - y } else { y }) < height
+        };
+        places.iter().flatten().filter(inside).count()
+    };
+    corners.into_iter().min_by_key(|(_, right, upper)| covered(*right, *upper)).map_or(SeriesLabelPosition::LowerLeft, |c| c.0)
 }
 
 /// Error against run time, from the fastest to the slowest round.
@@ -179,4 +200,18 @@ fn curves(report: &StudyReport) -> Vec<(String, Vec<usize>)> {
         }
     }
     curves
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_legend_goes_where_no_points_are() {
+        let place = |cost, error| Some(Place { cost, error, spread: (cost, cost), ringed: false });
+        let corner = |places: &[Option<Place>]| emptiest_corner(places, (1.0, 100.0), (1e-4, 1.0), 10);
+        assert!(matches!(corner(&[place(2.0, 0.5), place(50.0, 2e-4)]), SeriesLabelPosition::LowerLeft));
+        assert!(matches!(corner(&[place(2.0, 0.5), place(2.0, 2e-4), place(50.0, 2e-4)]), SeriesLabelPosition::UpperRight));
+        assert!(matches!(corner(&[place(2.0, 2e-4), place(50.0, 0.5), None]), SeriesLabelPosition::LowerRight));
+    }
 }
