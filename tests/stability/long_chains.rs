@@ -53,7 +53,10 @@ fn time(chain: &(System, State), workspace: &mut Workspace) -> f64 {
 fn chains_of_a_hundred_thousand_bodies_are_solved_in_linear_time() {
     let (short, long) = (chain(10_000), chain(100_000));
     let mut rows = Vec::new();
-    for (what, with_loads) in [("accelerations", false), ("accelerations and hinge loads", true)] {
+    // the list's bound; with loads a body moves 2 kB, which 10,000 of them move inside the caches and 100,000 (58 MB of records) beyond
+    let bounds = [(false, 13.0, "linear: 10"), (true, 16.0, "linear: 10, and records that leave the caches")];
+    for (with_loads, bound, reason) in bounds {
+        let what = if with_loads { "accelerations and hinge loads" } else { "accelerations" };
         let room = |c: &(System, State)| if with_loads { Workspace::new(&c.0) } else { Workspace::without_loads(&c.0) };
         let (mut of_short, mut of_long) = (room(&short), room(&long));
         // the least of several is the one that others disturbed least; in turns, so that both meet the same machine
@@ -64,7 +67,7 @@ fn chains_of_a_hundred_thousand_bodies_are_solved_in_linear_time() {
         }
         println!("{what}: {:.1} ns per body of 1e4, {:.1} of 1e5", least_short * 1e5, least_long * 1e4);
         rows.push(Row::at_most("S07", format!("chain of 100,000 rods, {what}: one evaluation (s)"), least_long, 1.0, ""));
-        rows.push(Row::at_most("S07", "the same: time over that of 10,000 rods", least_long / least_short, 13.0, "linear: 10"));
+        rows.push(Row::at_most("S07", "the same: time over that of 10,000 rods", least_long / least_short, bound, reason));
     }
     assert_rows(&rows);
 }
