@@ -120,6 +120,31 @@ fn hinge_inertia_at_the_edge_of_rounding_is_left_to_the_sweeps() {
     assert_eq!(coordinates(&by_either), coordinates(&swept));
 }
 
+/// All masses and inertias times a number: accelerations stay, loads are multiplied, whatever the products of inertias would become.
+#[test]
+fn systems_of_extreme_mass_move_like_ordinary_ones() {
+    let scaled = |factor: f64| {
+        let links = (0..3).map(|k| rigid(&k.to_string(), factor, [0.5, 0.1, 0.2], [0.1 * factor, 0.2 * factor, 0.25 * factor]));
+        let (system, mut state) = chain(links.collect(), &[[1.0, 0.0, 0.0]; 3]).build().unwrap();
+        for (k, (q, v)) in state.position.iter_mut().zip(&mut state.velocity).enumerate() {
+            (*q, *v) = (0.3 + 0.4 * k as f64, 0.5 - 0.3 * k as f64);
+        }
+        let mut workspace = Workspace::new(&system);
+        accelerations(&system, &state, &mut workspace).unwrap();
+        let loads: Vec<f64> = (0..3).flat_map(|k| (hinge_load(&workspace, k) / factor).iter().copied().collect::<Vec<_>>()).collect();
+        (workspace.acceleration.hinge.clone(), loads, workspace.is_by_kernel())
+    };
+    let (acceleration, loads, by_kernel) = scaled(1.0);
+    assert!(by_kernel);
+    for (factor, expected) in [(1e-165, false), (1e-155, false), (1e-58, true), (1e58, true), (1e155, false), (1e160, false)] {
+        let found = scaled(factor);
+        assert_eq!(found.2, expected, "{factor:e}");
+        // sums of some hundred products
+        assert_close(&found.0, &acceleration, 1e-13, &format!("accelerations at {factor:e}"));
+        assert_close(&found.1, &loads, 1e-13, &format!("loads at {factor:e}"));
+    }
+}
+
 #[test]
 fn kernel_leaves_to_the_sweeps_what_it_cannot_do() {
     // modes that move their own hinge

@@ -4,9 +4,26 @@ use crate::dynamics::sweep::graded::GradedInertia;
 use crate::model::{Body, BodyKind, HingeKind, State, System, TimeFunction};
 use nalgebra::{Matrix3, Vector3};
 use std::collections::HashMap;
+use std::ops::RangeInclusive;
 
 /// No index.
 pub const NONE: u32 = u32::MAX;
+
+/// Masses (kg) and inertias (kg m^2), besides none, and lengths (m), besides none, of which the inertias felt at a hinge are made.
+const MASSES: RangeInclusive<f64> = 1e-60..=1e60;
+const LENGTHS: RangeInclusive<f64> = 1e-12..=1e20;
+
+/// True if products of two inertias neither vanish nor overflow: one that passes for regular is at least a rounding of the least length
+/// squared, on the least mass, times the threshold of singular ones, some 1e-130.
+fn bears_products(body: &Body) -> bool {
+    let within = |range: &RangeInclusive<f64>, x: f64| x == 0.0 || range.contains(&x);
+    let inertia = match &body.kind {
+        BodyKind::Rigid(inertia) => inertia.rotational.trace(),
+        BodyKind::Flexible(_) => 0.0,
+    };
+    let (side, masses) = (&body.parent_side, [body.mass(), inertia]);
+    masses.iter().all(|&m| within(&MASSES, m)) && [side.position.norm(), side.offset.norm()].iter().all(|&l| within(&LENGTHS, l))
+}
 
 /// Geometry and inertia of a body, shared by all that are alike to the last bit.
 #[derive(Debug, Clone, Copy)]
@@ -135,12 +152,17 @@ pub struct Layout {
 }
 
 impl Layout {
-    /// Of `system`, if it is a tree whose modes hold the inboard hinges, whose masses the plain recursion bears, and small enough for its
-    /// indices.
+    /// Of `system`, if it is a tree whose modes hold the inboard hinges, whose masses the plain recursion and products of them bear, and small
+    /// enough for its indices.
     pub fn new(system: &System) -> Option<Self> {
         let held = system.bodies.iter().all(|b| b.flexible().is_none_or(|f| !f.inboard.moves()));
         let largest = system.position_count.max(system.velocity_count).max(system.bodies.len());
-        if !held || !system.closures.is_empty() || largest >= NONE as usize || GradedInertia::new(system).is_some() {
+        if !held
+            || !system.bodies.iter().all(bears_products)
+            || !system.closures.is_empty()
+            || largest >= NONE as usize
+            || GradedInertia::new(system).is_some()
+        {
             return None;
         }
         let mut layout = Self {
@@ -204,7 +226,7 @@ impl Layout {
             }
         }
         for (k, link) in layout.links.iter_mut().enumerate() {
-            let follows = link.parent as usize + 1 == k;
+            let follows = k.checked_sub(1).is_some_and(|before| link.parent as usize == before);
             link.is_plain = follows && [link.branch, link.load, link.flexible, link.tip].iter().all(|&i| i == NONE);
         }
         Some(layout)
