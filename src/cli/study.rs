@@ -209,6 +209,14 @@ fn write_tables(report: &StudyReport, output: &mut dyn Write) -> Result<(), Fail
     table.write(output)?;
     write_channels(report, output)?;
     let budget = 100.0 * report.error_budget;
+    if let Some(own) = report.reference.own_error.filter(|own| *own > report.error_budget) {
+        writeln!(
+            output,
+            "\nnote: the reference at ten times its tolerance is {:.1e} off, more than {budget} %: errors below that may be the reference's own; give \
+             tighter --tolerances, or a reference by --reference FILE.h5",
+            own
+        )?;
+    }
     match &report.cheapest {
         Some(cheapest) => {
             let point = &report.points[cheapest.point];

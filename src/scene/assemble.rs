@@ -269,6 +269,9 @@ fn assemble_spec(source: Source, spec: SceneSpec, overrides: &Overrides, files: 
         None => system.definition_order.iter().copied().filter(|&k| system.bodies[k].mode_count() > 0).collect(),
         Some(names) => names_to_indices(names, "stress", "body", |n| system.body_index(n), &source)?,
     };
+    for &k in stress.iter().filter(|&&k| spec.output.stress.is_some() && system.bodies[k].mode_count() == 0) {
+        left_out.push(format!("stress of \"{}\", which has no modes", system.bodies[k].name));
+    }
     let monitors = spec.monitor.iter().enumerate().map(|(i, m)| monitor(i, m, &system, &source)).collect::<Result<_, _>>()?;
     let mut boxes = vec![None; system.bodies.len()];
     for (body, &k) in spec.body.iter().zip(&system.definition_order) {

@@ -49,7 +49,7 @@ pub enum RequestError {
     #[error(transparent)]
     Scene(#[from] SceneError),
     /// Stress that cannot be compared.
-    #[error("{path}: {source}")]
+    #[error("{path}: the study cannot compare stress")]
     Stress {
         /// The scene.
         path: String,

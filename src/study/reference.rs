@@ -12,7 +12,7 @@ use serde::Serialize;
 use std::sync::atomic::AtomicBool;
 
 /// How much tighter than the tightest point the reference is.
-const TIGHTER: f64 = 1e-2;
+const TIGHTER: f64 = 100.0;
 /// Tightest tolerance of a reference; below it, rounding decides.
 const TIGHTEST: f64 = 1e-13;
 /// Tolerance of the reference where no point has a tolerance.
@@ -61,6 +61,11 @@ pub struct Candidates {
     pub notes: Vec<String>,
 }
 
+/// A quotient as it is meant to be read: 1e-7, not 1.0000000000000001e-7.
+fn twelve_digits(x: f64) -> f64 {
+    format!("{x:.11e}").parse().unwrap_or(x)
+}
+
 impl Candidates {
     /// The ways for `grid`: all modes, exact inertia, a tolerance a hundred times tighter than that of any point.
     ///
@@ -69,7 +74,7 @@ impl Candidates {
     pub fn of(grid: &Grid) -> Result<Self, StudyError> {
         let (base, mut notes) = (&grid.base, Vec::new());
         let tightest = grid.points.iter().filter_map(|p| p.tolerance).reduce(f64::min);
-        let tolerance = tightest.map_or(WITHOUT_TOLERANCES, |t| (TIGHTER * t).max(TIGHTEST));
+        let tolerance = tightest.map_or(WITHOUT_TOLERANCES, |t| twelve_digits(t / TIGHTER).max(TIGHTEST));
         let flexible = base.system.bodies.iter().any(|b| b.flexible().is_some());
         // as much as any point has
         let stiffens = grid.variants.iter().any(|(v, _)| v.geometric_stiffness == Some(true));

@@ -23,7 +23,9 @@ pub enum StudyError {
         failures: String,
     },
     /// Nothing happens in the reference.
-    #[error("every load and stress that is compared is zero, so that no error is relative to anything; output other hinges")]
+    #[error(
+        "every load and stress that is compared is zero, so that no error is relative to anything; output other hinges, or give a longer --duration"
+    )]
     Silent,
     /// A results file that cannot be the reference.
     #[error("--reference {path}: {message}")]
