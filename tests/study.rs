@@ -117,11 +117,7 @@ fn channels_of_rounding_are_not_counted() {
 
 /// A scene that steps of rk4 cannot follow: a very stiff spring.
 fn stiff(folder: &Path) -> String {
-    let scene = fs::read_to_string(pendulum()).unwrap().replace("position = [0.0] ", "stiffness = 1e7\nposition = [0.01] ");
-    assert!(scene.contains("stiffness"));
-    let path = folder.join("scene.toml");
-    fs::write(&path, scene).unwrap();
-    path.display().to_string()
+    changed_pendulum(folder, &[("position = [0.0] ", "stiffness = 1e7\nposition = [0.01] ")])
 }
 
 #[test]
