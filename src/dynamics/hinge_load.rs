@@ -3,7 +3,6 @@
 //! `f(k') = P+(k') alpha+(k') + z+(k')`: the spatial force of the parent on the child, moment about O, in O axes (Paper Eq. 18, 38).
 
 use super::Workspace;
-use super::kernel::TreeKernel;
 use crate::spatial::shift::{force_from, rotate};
 use nalgebra::Vector6;
 
@@ -21,18 +20,4 @@ pub fn hinge_load(workspace: &Workspace, k: usize) -> Vector6<f64> {
 pub fn hinge_load_on_parent(workspace: &Workspace, k: usize) -> Vector6<f64> {
     let hinge = &workspace.pose.bodies[k].hinge;
     -force_from(&hinge.translation, &rotate(&hinge.rotation, &hinge_load(workspace, k)))
-}
-
-/// Loads at all hinges, one per body: those that the evaluation left, or, where it left none, those made in `room`, which has one entry per body.
-#[inline]
-pub fn hinge_loads<'a>(workspace: &'a Workspace, room: &'a mut [Vector6<f64>]) -> &'a [Vector6<f64>] {
-    match workspace.kernel().map(TreeKernel::hinge_loads) {
-        Some(loads) if loads.len() == room.len() => loads,
-        _ => {
-            for (k, load) in room.iter_mut().enumerate() {
-                *load = hinge_load(workspace, k);
-            }
-            room
-        }
-    }
 }

@@ -322,7 +322,8 @@ impl Workspace {
 
     /// The kernel of a tree, if the last evaluation was its.
     #[inline]
-    fn kernel(&self) -> Option<&TreeKernel> {
+    #[must_use]
+    pub fn kernel(&self) -> Option<&TreeKernel> {
         self.tree.as_deref().filter(|_| self.by_kernel)
     }
 

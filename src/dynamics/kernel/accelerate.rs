@@ -1,16 +1,19 @@
 //! Third pass: accelerations and hinge loads, from the base to the tips. Source: Paper Eq. 13 and 18, in inertial axes.
 
-use super::layout::{Axes, Link, Passage, Shape};
-use super::record::{Motion, Outboard, block};
+use super::layout::Passage;
+use super::record::Load;
 use super::{Branch, NONE, TreeKernel};
 use crate::dynamics::sweep::force_inward::world_acceleration;
 use crate::model::System;
 use crate::spatial::lanes::Lanes;
 use crate::spatial::shift::spatial;
-use nalgebra::{Vector3, Vector6};
+use nalgebra::Vector3;
 
 /// Records that are together larger than this (bytes) lie in memory rather than in caches.
 const FAR: usize = 8 << 20;
+
+/// How many bodies behind the accelerations the loads are made: of numbers that are there, so that they wait for nothing.
+const BEHIND: usize = 2;
 
 /// How many bodies ahead those are asked for.
 const AHEAD: usize = 8;
@@ -37,22 +40,24 @@ pub fn accelerate<L: Lanes, const LOADS: bool>(s: L, tree: &mut TreeKernel, syst
             (angular, linear) = (s.of_three([a[0], a[1], a[2]]), s.of_three([a[3], a[4], a[5]]));
         } else if link.parent != last {
             (angular, linear) = match layout.links.get(link.parent as usize).and_then(|p| branches.get(p.branch as usize)) {
-                Some(Branch { acceleration: a, .. }) => (s.of_three([a[0], a[1], a[2]]), s.of_three([a[3], a[4], a[5]])),
+                Some(Branch { acceleration: a, .. }) => (s.load(a[0]), s.load(a[1])),
                 None => at_world,
             };
         }
-        if LOADS
-            && is_far
-            && let Some(next) = outboard.get(k + AHEAD)
-        {
-            s.fetch(next);
+        if LOADS {
+            if is_far && let Some(next) = outboard.get(k + AHEAD) {
+                s.fetch(next);
+            }
+            if k >= BEHIND {
+                loads[k - BEHIND].settle(s, &outboard[k - BEHIND]);
+            }
         }
         if link.passage != Passage::General {
             let own = &hinges[k];
             // alpha+ = phi* alpha of the parent
             linear = s.sub(linear, s.cross(s.load(own.l), angular));
             if LOADS {
-                write_load(s, &outboard[k], &motion[k], link, &layout.shapes, [angular, linear], &mut loads[k]);
+                loads[k] = Load::of(s, angular, linear);
             }
             (angular, linear) = (s.add(angular, s.load(own.bias_angular)), s.add(linear, s.load(own.bias_linear)));
             if link.passage != Passage::Fixed {
@@ -71,7 +76,7 @@ pub fn accelerate<L: Lanes, const LOADS: bool>(s: L, tree: &mut TreeKernel, syst
             let own = &general[link.general as usize];
             linear = s.sub(linear, s.cross(s.of_three(own.l.into()), angular));
             if LOADS {
-                write_load(s, &outboard[k], &motion[k], link, &layout.shapes, [angular, linear], &mut loads[k]);
+                loads[k] = Load::of(s, angular, linear);
             }
             let rates = system.bodies[k].velocity_range();
             let outer = spatial(&Vector3::from(s.three(angular)), &Vector3::from(s.three(linear)));
@@ -87,39 +92,12 @@ pub fn accelerate<L: Lanes, const LOADS: bool>(s: L, tree: &mut TreeKernel, syst
             own.accelerate(s, constants, [angular, linear], &mut modal[system.bodies[k].modal_range()]);
         }
         if let Some(branch) = branches.get_mut(link.branch as usize) {
-            let (a, b) = (s.three(angular), s.three(linear));
-            branch.acceleration = [a[0], a[1], a[2], b[0], b[1], b[2]];
+            branch.acceleration = [s.store(angular), s.store(linear)];
         }
     }
-}
-
-/// `P+ alpha+ + z+`, turned into O axes.
-#[inline(always)]
-fn write_load<L: Lanes>(
-    s: L,
-    felt: &Outboard,
-    motion: &Motion,
-    link: &Link,
-    shapes: &[Shape],
-    [angular, linear]: [L::V; 2],
-    load: &mut Vector6<f64>,
-) {
-    let [moment, force] = felt.inertia(s).times_add(s, angular, linear, felt.wrench(s));
-    let [x, y, z] = block(s, &motion.turn);
-    // a table of jumps, which a match would become, is foreseen less well than these two
-    let axes = if link.axes == Axes::Same {
-        [x, y, z]
-    } else if link.axes == Axes::Next {
-        [y, z, x]
-    } else {
-        let t = &shapes[link.shape as usize].turn;
-        [
-            s.combine_numbers([x, y, z], [t[0], t[3], t[6]]),
-            s.combine_numbers([x, y, z], [t[1], t[4], t[7]]),
-            s.combine_numbers([x, y, z], [t[2], t[5], t[8]]),
-        ]
-    };
-    let moments = [s.mul(axes[0], moment), s.mul(axes[1], moment), s.mul(axes[2], moment)];
-    let forces = [s.mul(axes[0], force), s.mul(axes[1], force), s.mul(axes[2], force)];
-    s.six_sums(moments, forces, &mut load.data.0[0]);
+    if LOADS {
+        for k in n.saturating_sub(BEHIND)..n {
+            loads[k].settle(s, &outboard[k]);
+        }
+    }
 }

@@ -15,6 +15,8 @@ use nalgebra::{Matrix3, Vector3, Vector6};
 #[derive(Debug, Clone)]
 pub struct GeneralHinge {
     body: usize,
+    /// Free, and not prescribed: it transmits what acts on its rates and nothing else.
+    pub is_free: bool,
     pose: HingePose,
     /// O of the parent to O (m).
     pub l: Vector3<f64>,
@@ -35,9 +37,11 @@ pub struct GeneralHinge {
 
 impl GeneralHinge {
     /// Of body `body`.
-    pub fn new(body: usize) -> Self {
+    pub fn new(system: &System, body: usize) -> Self {
+        let hinge = &system.bodies[body].hinge;
         Self {
             body,
+            is_free: matches!(hinge.kind, HingeKind::Free) && !hinge.is_prescribed(),
             pose: HingePose::default(),
             l: Vector3::zeros(),
             relative: Vector6::zeros(),
@@ -93,12 +97,7 @@ impl GeneralHinge {
         force: &Vector6<f64>,
     ) -> Result<(SpatialInertia, Vector6<f64>), Doubtful> {
         let body = &system.bodies[self.body];
-        let m = body.hinge.kind.rate_count();
-        let applied = &mut self.applied[..m];
-        body.hinge.applied_force(state.time, &state.position[body.position_range()], &state.velocity[body.velocity_range()], applied);
-        if matches!(body.hinge.kind, HingeKind::Free) && !body.hinge.is_prescribed() {
-            return self.release(inertia, force);
-        }
+        let m = self.find_applied(system, state);
         self.inertia.P_hinge = *inertia;
         eliminate_hinge(body, &self.map, None, &mut self.inertia, |_| f64::INFINITY).map_err(|_| Doubtful)?;
         let left = self.inertia.P_plus;
@@ -115,9 +114,25 @@ impl GeneralHinge {
         Ok((left, z + left.times(&self.bias)))
     }
 
-    /// The same through a free hinge, which transmits what acts on its rates and nothing else. Its map H is a rotation of both halves, so
-    /// that `G = H` and `nu = H* P^-1 (H applied - z)`.
-    fn release(&mut self, inertia: &SpatialInertia, force: &Vector6<f64>) -> Result<(SpatialInertia, Vector6<f64>), Doubtful> {
+    /// Forces on the rates at `state`; returns the number of rates.
+    fn find_applied(&mut self, system: &System, state: &State) -> usize {
+        let body = &system.bodies[self.body];
+        let m = body.hinge.kind.rate_count();
+        let (q, v) = (&state.position[body.position_range()], &state.velocity[body.velocity_range()]);
+        body.hinge.applied_force(state.time, q, v, &mut self.applied[..m]);
+        m
+    }
+
+    /// The same through a free hinge: `P+` is zero, returned is `z+`. Its map H is a rotation of both halves, so that `G = H` and
+    /// `nu = H* P^-1 (H applied - z)`.
+    pub fn release(
+        &mut self,
+        system: &System,
+        state: &State,
+        inertia: &SpatialInertia,
+        force: &Vector6<f64>,
+    ) -> Result<Vector6<f64>, Doubtful> {
+        self.find_applied(system, state);
         let felt = Vector6::from(self.applied);
         let felt = spatial(&(self.rotation * angular(&felt)), &(self.rotation * linear(&felt)));
         let free = solve_positive(inertia, felt - force).ok_or(Doubtful)?;
@@ -125,7 +140,7 @@ impl GeneralHinge {
             self.inertia.G[i] = self.map[i];
             self.nu[i] = self.map[i].dot(&free);
         }
-        Ok((SpatialInertia::default(), felt))
+        Ok(felt)
     }
 
     /// Third pass: the body's acceleration from that of O+ at O; writes the accelerations of the rates.

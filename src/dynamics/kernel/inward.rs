@@ -10,6 +10,7 @@ use super::{Arm, Doubtful, TreeKernel, arm, parent_motion};
 use crate::dynamics::sweep::inertia_inward::SINGULAR;
 use crate::model::{State, System};
 use crate::spatial::lanes::Lanes;
+use crate::spatial::shift::{angular, linear};
 use nalgebra::Matrix3;
 
 /// Inertia and residual force in registers.
@@ -23,16 +24,30 @@ pub struct Felt<V> {
 /// Fills the hinges, and what loads are made of.
 #[inline(always)]
 pub fn inward<L: Lanes, const LOADS: bool>(s: L, tree: &mut TreeKernel, system: &System, state: &State) -> Result<(), Doubtful> {
-    let TreeKernel { layout, motion, hinges, outboard, branches, general, flexible, modal_shapes, external, .. } = tree;
+    let TreeKernel { layout, motion, applied, hinges, outboard, branches, general, flexible, modal_shapes, external, .. } = tree;
     for branch in branches.iter_mut() {
         branch.felt = Outboard::default();
     }
     let mut felt = Felt::none(s);
     // slices of one length need no check of an index in the loop
     let n = layout.links.len();
-    let (links, motion, hinges) = (&layout.links[..n], &motion[..n], &mut hinges[..n]);
+    let (links, motion, applied, hinges) = (&layout.links[..n], &motion[..n], &applied[..n], &mut hinges[..n]);
     let outboard = if LOADS { &mut outboard[..n] } else { &mut outboard[..0] };
-    for k in (0..n).rev() {
+    let mut k = n;
+    while k > 0 {
+        k -= 1;
+        // most bodies of most systems: in a loop that asks no questions and calls nothing, so that what is felt stays in registers
+        while links[k].is_plain && links[k].passage == Passage::Revolute && k > 0 {
+            let (link, parent) = (&links[k], &motion[k - 1]);
+            let shape = &layout.shapes[link.shape as usize];
+            let (turn, omega) = (block(s, &motion[k].turn), s.load(motion[k].omega));
+            felt.add_body(s, shape, turn, omega);
+            let at = arm(s, link, shape, state, block(s, &parent.turn), s.load(parent.omega), turn[2]);
+            let place = if LOADS { Some(&mut outboard[k]) } else { None };
+            hinges[k] = felt.pass_revolute(s, turn[2], applied[k], &at, place)?;
+            felt.shift(s, at.l);
+            k -= 1;
+        }
         let link = &links[k];
         let shape = &layout.shapes[link.shape as usize];
         let (turn, omega) = (block(s, &motion[k].turn), s.load(motion[k].omega));
@@ -55,15 +70,21 @@ pub fn inward<L: Lanes, const LOADS: bool>(s: L, tree: &mut TreeKernel, system: 
         let l = if link.passage == Passage::General {
             let own = &mut general[link.general as usize];
             let (inertia, force) = felt.stored(s).plain();
-            let (inertia, force) = own.filter(system, state, &inertia, &force)?;
-            felt = Felt::of(s, &Outboard::new(&inertia, &force));
+            felt = if own.is_free {
+                let transmitted = own.release(system, state, &inertia, &force)?;
+                let zero = Felt::none(s);
+                Felt { moment: s.of_three(angular(&transmitted).into()), force: s.of_three(linear(&transmitted).into()), ..zero }
+            } else {
+                let (inertia, force) = own.filter(system, state, &inertia, &force)?;
+                Felt::of(s, &Outboard::new(&inertia, &force))
+            };
             s.of_three(own.l.into())
         } else {
             let (parent_turn, parent_omega) = parent_motion(s, link, layout, motion, flexible);
             let at = arm(s, link, shape, state, parent_turn, parent_omega, turn[2]);
             match link.passage {
-                Passage::Revolute => hinges[k] = felt.pass_revolute(s, turn[2], link.applied(system, state, layout), &at)?,
-                Passage::Slide => hinges[k] = felt.pass_slide(s, turn[2], shape, link.applied(system, state, layout), &at)?,
+                Passage::Revolute => hinges[k] = felt.pass_revolute(s, turn[2], applied[k], &at, None)?,
+                Passage::Slide => hinges[k] = felt.pass_slide(s, turn[2], shape, applied[k], &at)?,
                 Passage::Fixed | Passage::General => {
                     felt.take_bias(s, &at);
                     hinges[k] = Hinge { l: s.store(at.l), bias_linear: s.store(at.linear), ..Hinge::default() };
@@ -119,9 +140,17 @@ impl<V: Copy> Felt<V> {
         translational[0] = s.add(translational[0], s.splat(shape.mass));
     }
 
-    /// Through a revolute hinge about `axis` with the torque `applied`: what is left is `P+` and `z+`.
+    /// Through a revolute hinge about `axis` with the torque `applied`: what is left is `P+` and `z+`, which are put into `place` as soon as
+    /// they are known.
     #[inline(always)]
-    fn pass_revolute<L: Lanes<V = V>>(&mut self, s: L, axis: V, applied: f64, at: &Arm<V>) -> Result<Hinge, Doubtful> {
+    fn pass_revolute<L: Lanes<V = V>>(
+        &mut self,
+        s: L,
+        axis: V,
+        applied: f64,
+        at: &Arm<V>,
+        place: Option<&mut Outboard>,
+    ) -> Result<Hinge, Doubtful> {
         // P H*, D and its inverse
         let angular = symmetric_times(s, self.inertia.rotational, axis);
         let linear = transposed_times(s, self.inertia.coupling, axis);
@@ -131,7 +160,7 @@ impl<V: Copy> Felt<V> {
             return Err(Doubtful);
         }
         let epsilon = s.sub(s.splat(applied), s.total(s.mul(axis, self.moment)));
-        Ok(self.pass(s, [angular, linear], s.inverse(pivot), epsilon, at))
+        Ok(self.pass(s, [angular, linear], s.inverse(pivot), epsilon, at, place))
     }
 
     /// The same through a hinge that travels along `axis`, and turns about it or not.
@@ -146,17 +175,31 @@ impl<V: Copy> Felt<V> {
             return Err(Doubtful);
         }
         let epsilon = applied - s.dot_two(turn, self.moment, travel, self.force);
-        Ok(self.pass(s, [angular, linear], s.splat(1.0 / pivot), s.splat(epsilon), at))
+        Ok(self.pass(s, [angular, linear], s.splat(1.0 / pivot), s.splat(epsilon), at, None))
     }
 
     /// `P+ = P - G D G*` and `z+ = z + G epsilon + P+ a`, with `P H*` at hand, and the inverse of D and epsilon everywhere.
     #[inline(always)]
-    fn pass<L: Lanes<V = V>>(&mut self, s: L, [angular, linear]: Pair<V>, inverse: V, epsilon: V, at: &Arm<V>) -> Hinge {
+    fn pass<L: Lanes<V = V>>(
+        &mut self,
+        s: L,
+        [angular, linear]: Pair<V>,
+        inverse: V,
+        epsilon: V,
+        at: &Arm<V>,
+        mut place: Option<&mut Outboard>,
+    ) -> Hinge {
         let nu = s.mul(epsilon, inverse);
         self.inertia = self.inertia.less(s, [angular, linear], inverse);
+        if let Some(place) = &mut place {
+            place.put_inertia(s, &self.inertia);
+        }
         self.moment = s.mul_add(angular, nu, self.moment);
         self.force = s.mul_add(linear, nu, self.force);
         self.take_bias(s, at);
+        if let Some(place) = &mut place {
+            place.put_wrench(s, [self.moment, self.force]);
+        }
         let [x, y, z] = s.three(s.mul(angular, inverse));
         Hinge {
             gain_angular: [x, y, z, s.first(nu)],

@@ -45,31 +45,6 @@ pub struct Shape {
     pub travel_rate: f64,
 }
 
-/// Which link axes (x, y, z) the axes of O are.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Axes {
-    /// (x, y, z): the hinge axis is that of O.
-    Same,
-    /// (y, z, x).
-    Next,
-    /// Neither.
-    Turned,
-}
-
-impl Axes {
-    /// For link axes that `turn` takes to O axes.
-    fn of(turn: &Matrix3<f64>) -> Self {
-        let (x, y, z) = (Vector3::x(), Vector3::y(), Vector3::z());
-        if *turn == Matrix3::identity() {
-            Self::Same
-        } else if *turn == Matrix3::from_columns(&[z, x, y]) {
-            Self::Next
-        } else {
-            Self::Turned
-        }
-    }
-}
-
 /// How the passes take a hinge.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Passage {
@@ -95,8 +70,6 @@ pub struct Link {
     /// Rigid, without external load, joined to the body before it and to no other but the one after it: most bodies of long chains, which need
     /// none of the questions that the others are asked.
     pub is_plain: bool,
-    /// What the way from link axes to O axes is.
-    pub axes: Axes,
     /// What its hinge is.
     pub passage: Passage,
     /// Index in `TreeKernel::general`, [`NONE`] for the other passages.
@@ -190,7 +163,6 @@ impl Layout {
                 shape,
                 branch: NONE,
                 is_plain: false,
-                axes: Axes::of(&layout.shapes[shape as usize].turn),
                 passage: passage_of(body),
                 general: NONE,
                 drive: NONE,

@@ -10,7 +10,7 @@
 //! | `outward`: attitude and angular velocity | `Motion` | 16 |
 //! | `inward`: articulated inertias, residual forces | `Hinge` | 20 |
 //! | the same, where loads are asked for | `Outboard` | 36 |
-//! | `accelerate`: accelerations and loads | the load | 6 |
+//! | `accelerate`: accelerations, and `Load`s if asked for | `Load` | 8 |
 //!
 //! Modes are the business of `flexible`, in the axes of each body.
 //!
@@ -34,13 +34,13 @@ mod tip;
 
 use crate::model::{State, System};
 use crate::spatial::lanes::{Kernel, Lanes, Processor};
-use crate::spatial::shift::spatial;
+use crate::spatial::shift::{rotate_back, spatial};
 use flexible::FlexibleLink;
 use hinge::GeneralHinge;
 use layout::{Layout, Link, NONE, Passage, Shape};
 use modal_shape::ModalShape;
 use nalgebra::{Vector3, Vector6};
-use record::{Hinge, Motion, Outboard};
+use record::{Hinge, Load, Motion, Outboard, Quad};
 
 /// Quantities of a body that some child does not follow directly.
 #[derive(Debug, Clone, Copy)]
@@ -48,7 +48,7 @@ pub(super) struct Branch {
     /// What those children add to its inertia and residual force.
     pub felt: Outboard,
     /// Its acceleration (angular; linear) at O in inertial axes.
-    pub acceleration: [f64; 6],
+    pub acceleration: [Quad; 2],
 }
 
 /// An evaluation that the kernel leaves to the sweeps: a hinge inertia at the edge of rounding, or a load that is no number.
@@ -61,10 +61,12 @@ pub struct TreeKernel {
     processor: Processor,
     layout: Layout,
     motion: Vec<Motion>,
+    /// Force of motor, spring and damper on the rate of hinges of one (N m or N).
+    applied: Vec<f64>,
     hinges: Vec<Hinge>,
+    /// None if loads are not asked for.
     outboard: Vec<Outboard>,
-    /// Load at every hinge: (moment about O; force), O axes.
-    loads: Vec<Vector6<f64>>,
+    loads: Vec<Load>,
     branches: Vec<Branch>,
     general: Vec<GeneralHinge>,
     flexible: Vec<FlexibleLink>,
@@ -98,11 +100,12 @@ impl TreeKernel {
         Some(Self {
             processor,
             motion: vec![Motion::REST; n],
+            applied: vec![0.0; n],
             hinges: vec![Hinge::default(); n],
             outboard: vec![Outboard::default(); if with_loads { n } else { 0 }],
-            loads: vec![Vector6::zeros(); if with_loads { n } else { 0 }],
-            branches: vec![Branch { felt: Outboard::default(), acceleration: [0.0; 6] }; layout.branches],
-            general: layout.general.iter().map(|&body| GeneralHinge::new(body)).collect(),
+            loads: vec![Load::default(); if with_loads { n } else { 0 }],
+            branches: vec![Branch { felt: Outboard::default(), acceleration: [[0.0; 4]; 2] }; layout.branches],
+            general: layout.general.iter().map(|&body| GeneralHinge::new(system, body)).collect(),
             velocity: vec![Vector3::zeros(); system.loads.iter().map(|l| l.body + 1).max().unwrap_or(0)],
             external: vec![Vector6::zeros(); layout.loaded.len()],
             flexible,
@@ -131,17 +134,18 @@ impl TreeKernel {
         }
     }
 
-    /// Load at the hinge of body `k` after the last evaluation: (moment N m about O; force N), by the parent on the child, O axes. Not a
-    /// number if loads were not asked for.
+    /// Load at the hinge of body `k` after the last evaluation: (moment N m about O; force N), by the parent on the child, inertial axes. Not
+    /// a number if loads were not asked for.
     #[must_use]
-    pub fn hinge_load(&self, k: usize) -> Vector6<f64> {
-        self.loads.get(k).copied().unwrap_or_else(|| Vector6::repeat(f64::NAN))
+    pub fn inertial_load(&self, k: usize) -> Vector6<f64> {
+        self.loads.get(k).map_or_else(|| Vector6::repeat(f64::NAN), Load::plain)
     }
 
-    /// All of them, one per body; none if loads were not asked for.
-    #[inline]
-    pub(super) fn hinge_loads(&self) -> &[Vector6<f64>] {
-        &self.loads
+    /// The same in O axes.
+    #[must_use]
+    pub fn hinge_load(&self, k: usize) -> Vector6<f64> {
+        let axes = self.motion[k].rotation() * self.layout.shapes[self.layout.links[k].shape as usize].turn.transpose();
+        rotate_back(&axes, &self.inertial_load(k))
     }
 
     /// Power (W) of motors, dampers, prescribed motions and external loads at the last evaluation, at `state`.

@@ -9,7 +9,7 @@ use crate::spatial::lanes::Lanes;
 /// Fills the motions, and what general hinges make of them.
 #[inline(always)]
 pub fn outward<L: Lanes>(s: L, tree: &mut TreeKernel, system: &System, state: &State) {
-    let TreeKernel { layout, motion, general, flexible, modal_shapes, velocity, .. } = tree;
+    let TreeKernel { layout, motion, applied, general, flexible, modal_shapes, velocity, .. } = tree;
     let (mut last, mut turn, mut omega) = (NONE, block(s, &Motion::REST.turn), s.splat(0.0));
     for (k, link) in layout.links.iter().enumerate() {
         if !link.is_plain && (link.parent != last || link.tip != NONE) {
@@ -23,6 +23,9 @@ pub fn outward<L: Lanes>(s: L, tree: &mut TreeKernel, system: &System, state: &S
             (turn, omega) = (block(s, &motion[k].turn), s.load(motion[k].omega));
         } else {
             turn = fixed(s, shape, turn);
+            if link.passage != Passage::Fixed {
+                applied[k] = link.applied(system, state, layout);
+            }
             match link.passage {
                 Passage::Revolute => {
                     turn = turned(s, turn, state.position[link.q as usize]);

@@ -49,6 +49,14 @@ pub struct Outboard {
     pub force: Quad,
 }
 
+/// Load at a hinge, at O in inertial axes; at first `alpha+`, of which it is made.
+#[derive(Debug, Clone, Copy, Default)]
+#[repr(C, align(32))]
+pub struct Load {
+    pub moment: Quad,
+    pub force: Quad,
+}
+
 /// Columns in registers.
 #[inline(always)]
 pub fn block<L: Lanes>(s: L, b: &Block) -> [L::V; 3] {
@@ -97,18 +105,49 @@ impl Motion {
     }
 }
 
+impl Load {
+    /// `alpha+`.
+    #[inline(always)]
+    pub fn of<L: Lanes>(s: L, angular: L::V, linear: L::V) -> Self {
+        Self { moment: s.store(angular), force: s.store(linear) }
+    }
+
+    /// `P+ alpha+ + z+` in the place of `alpha+`.
+    #[inline(always)]
+    pub fn settle<L: Lanes>(&mut self, s: L, felt: &Outboard) {
+        let [moment, force] = felt.inertia(s).times_add(s, s.load(self.moment), s.load(self.force), felt.wrench(s));
+        *self = Self { moment: s.store(moment), force: s.store(force) };
+    }
+
+    /// (moment; force) in plain algebra.
+    pub fn plain(&self) -> Vector6<f64> {
+        spatial(&vector(&self.moment), &vector(&self.force))
+    }
+}
+
 impl Outboard {
     /// To memory.
     #[inline(always)]
-    pub fn of<L: Lanes>(s: L, inertia: &Inertia<L::V>, [moment, force]: [L::V; 2]) -> Self {
-        let (r, c, t) = (inertia.rotational, inertia.coupling, inertia.translational);
-        Self {
-            rotational: [s.store(r[0]), s.store(r[1])],
-            coupling: stored(s, c),
-            translational: [s.store(t[0]), s.store(t[1])],
-            moment: s.store(moment),
-            force: s.store(force),
-        }
+    pub fn of<L: Lanes>(s: L, inertia: &Inertia<L::V>, wrench: [L::V; 2]) -> Self {
+        let mut record = Self::default();
+        record.put_inertia(s, inertia);
+        record.put_wrench(s, wrench);
+        record
+    }
+
+    /// The inertia to memory.
+    #[inline(always)]
+    pub fn put_inertia<L: Lanes>(&mut self, s: L, inertia: &Inertia<L::V>) {
+        let (r, t) = (inertia.rotational, inertia.translational);
+        self.rotational = [s.store(r[0]), s.store(r[1])];
+        self.coupling = stored(s, inertia.coupling);
+        self.translational = [s.store(t[0]), s.store(t[1])];
+    }
+
+    /// Moment and force to memory.
+    #[inline(always)]
+    pub fn put_wrench<L: Lanes>(&mut self, s: L, [moment, force]: [L::V; 2]) {
+        (self.moment, self.force) = (s.store(moment), s.store(force));
     }
 
     /// The inertia in registers.

@@ -67,13 +67,6 @@ pub trait Lanes: Copy {
     /// The sums of the first three numbers of three registers.
     fn sums(self, a: [Self::V; 3]) -> Self::V;
 
-    /// The sums of the first three numbers of six registers, to memory.
-    #[inline(always)]
-    fn six_sums(self, a: [Self::V; 3], b: [Self::V; 3], out: &mut [f64; 6]) {
-        let (a, b) = (self.three(self.sums(a)), self.three(self.sums(b)));
-        *out = [a[0], a[1], a[2], b[0], b[1], b[2]];
-    }
-
     /// The sums of all four numbers of four registers.
     #[inline(always)]
     fn sums_of_four(self, a: [Self::V; 4]) -> Self::V {

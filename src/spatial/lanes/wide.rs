@@ -111,23 +111,4 @@ impl Lanes for Wide {
         let z = self.avx._mm256_permute2f128_pd::<0x31>(low, c);
         self.add(self.add(x, y), z)
     }
-
-    #[inline(always)]
-    fn six_sums(self, [a, b, c]: [Self::V; 3], [d, e, f]: [Self::V; 3], out: &mut [f64; 6]) {
-        // first and third numbers of two registers each, second numbers (and fourth, which fall away)
-        let (ab, cd, ef) = (self.avx._mm256_unpacklo_pd(a, b), self.avx._mm256_unpacklo_pd(c, d), self.avx._mm256_unpacklo_pd(e, f));
-        let (ab2, cd2, ef2) = (self.avx._mm256_unpackhi_pd(a, b), self.avx._mm256_unpackhi_pd(c, d), self.avx._mm256_unpackhi_pd(e, f));
-        let x = self.avx._mm256_permute2f128_pd::<0x20>(ab, cd);
-        let y = self.avx._mm256_permute2f128_pd::<0x20>(ab2, cd2);
-        let z = self.avx._mm256_permute2f128_pd::<0x31>(ab, cd);
-        let last = self.add(self.add(ef, ef2), self.avx._mm256_permute2f128_pd::<0x11>(ef, ef));
-        let first = self.store(self.add(self.add(x, y), z));
-        let last = self.store(last);
-        if let Some(place) = out.first_chunk_mut() {
-            *place = first;
-        }
-        if let Some(place) = out.last_chunk_mut() {
-            *place = [last[0], last[1]];
-        }
-    }
 }
