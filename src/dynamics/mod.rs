@@ -48,6 +48,7 @@ pub mod energy;
 pub mod flexible_inertia;
 pub mod frame_motion;
 pub mod hinge_load;
+pub mod implicit_matrix;
 pub mod inverse;
 pub mod kernel;
 pub mod modal_block;

@@ -35,16 +35,12 @@ use super::runge_kutta::{combine, hermite};
 use super::step_control::{Tolerance, error_norm};
 use super::w_tableau::{STAGES, WTableau};
 use crate::dynamics::DynamicsError;
-use crate::dynamics::closed_chain::ClosedChain;
-use crate::dynamics::sweep::inertia_inward::{AddedInertia, InertiaScratch, inertia_inward_with};
-use crate::dynamics::sweep::pose_outward::{PoseScratch, pose_outward};
-use crate::dynamics::sweep::response::Response;
-use crate::model::hinge::MAX_RATES;
-use crate::model::{Body, HingeKind, State};
+use crate::dynamics::implicit_matrix::ImplicitMatrix;
+use crate::dynamics::sweep::inertia_inward::HingeBlock;
+use crate::model::hinge::{MAX_RATES, quaternion_in};
+use crate::model::{Body, HingeKind, State, System};
+use crate::spatial::rotation::matrix_of_quaternion;
 use nalgebra::{Matrix3, Vector3};
-
-/// A square block of one hinge's rates.
-type Block = [[f64; MAX_RATES]; MAX_RATES];
 
 /// A W-method at work.
 #[derive(Debug)]
@@ -63,16 +59,23 @@ pub struct RosenbrockW {
     /// `sum_{j<i} gamma_ij k_j`.
     s: Vec<f64>,
     end: State,
-    pose: PoseScratch,
-    inertia: InertiaScratch,
-    added: AddedInertia,
-    /// Stiffness of the springs on the rates of each hinge at the step's start, none without springs.
-    spring: Vec<Option<Block>>,
-    /// Generalised forces of a stage, and what they cause.
-    response: Response,
-    all: Vec<usize>,
-    /// Cut closures, held in every stage; none for a tree.
-    closed: Option<Box<ClosedChain>>,
+    /// Diagonals of K and C, indexed like increments; K of springs about turns is in `turning`.
+    stiffness: Vec<f64>,
+    damping: Vec<f64>,
+    /// Hinges whose increments are not the integrals of their rates.
+    turning: Vec<TurningHinge>,
+    /// `M + h g C + h^2 g^2 K`.
+    matrix: ImplicitMatrix,
+}
+
+/// A hinge with a quaternion.
+#[derive(Debug)]
+struct TurningHinge {
+    body: usize,
+    /// Rate of the travel of a free hinge, which is measured in O axes, to that of its increment, in O+ axes, at the step's start.
+    travel: Option<Matrix3<f64>>,
+    /// Stiffness of its springs on its rates at the step's start; none without springs.
+    spring: Option<HingeBlock>,
 }
 
 impl RosenbrockW {
@@ -81,6 +84,10 @@ impl RosenbrockW {
     pub fn new(tableau: WTableau, tolerance: Tolerance, chart: &Chart<'_>) -> Self {
         let (n, system) = (chart.len(), chart.system);
         let zeros = || vec![0.0; n];
+        let [stiffness, damping] = diagonals(system);
+        let turns = |(body, b): (usize, &Body)| {
+            (b.hinge.kind.has_quaternion() && !b.hinge.is_prescribed()).then_some(TurningHinge { body, travel: None, spring: None })
+        };
         Self {
             tableau,
             tolerance,
@@ -93,105 +100,90 @@ impl RosenbrockW {
             k: vec![zeros(); STAGES + 1],
             s: zeros(),
             end: chart.base.clone(),
-            pose: PoseScratch::new(system),
-            inertia: InertiaScratch::new(system),
-            added: AddedInertia { modal: vec![1.0; system.modal_count], hinge: vec![None; system.bodies.len()] },
-            spring: vec![None; system.bodies.len()],
-            response: Response::new(system),
-            all: (0..system.bodies.len()).collect(),
-            closed: ClosedChain::new(system),
+            stiffness,
+            damping,
+            turning: system.bodies.iter().enumerate().filter_map(turns).collect(),
+            matrix: ImplicitMatrix::new(system),
         }
     }
 
     /// What stays the same over all tries of a step from the chart's base.
     fn begin(&mut self, chart: &Chart<'_>) {
-        pose_outward(chart.system, &chart.base, &mut self.pose);
-        for (body, spring) in chart.system.bodies.iter().zip(&mut self.spring) {
-            *spring = spring_stiffness(body, &chart.base.position[body.position_range()]);
+        for own in &mut self.turning {
+            let body = &chart.system.bodies[own.body];
+            let q = &chart.base.position[body.position_range()];
+            own.spring = spring_stiffness(body, q);
+            own.travel = matches!(body.hinge.kind, HingeKind::Free).then(|| matrix_of_quaternion(&quaternion_in(&q[3..7])));
         }
     }
 
     /// Factors `M + h g C + h^2 g^2 K`.
     fn factor(&mut self, chart: &Chart<'_>, h: f64) -> Result<(), DynamicsError> {
-        let hg = h * self.tableau.gamma;
-        for (k, body) in chart.system.bodies.iter().enumerate() {
-            if let Some(flexible) = body.flexible() {
-                let rows = flexible.damping.iter().zip(&flexible.stiffness);
-                for (l, (c, k)) in self.added.modal[body.modal_range()].iter_mut().zip(rows) {
-                    *l = 1.0 + hg * c + hg * hg * k;
-                }
-            }
-            let damping = &body.hinge.damping;
-            self.added.hinge[k] = if body.hinge.is_prescribed() || (damping.is_empty() && self.spring[k].is_none()) {
-                None
-            } else {
-                let mut block = self.spring[k].unwrap_or_default();
-                block.iter_mut().flatten().for_each(|x| *x *= hg * hg);
-                damping.iter().enumerate().for_each(|(i, c)| block[i][i] += hg * c);
-                Some(block)
-            };
+        let (hg, nv) = (h * self.tableau.gamma, chart.system.velocity_count);
+        let added = &mut self.matrix.added;
+        let rows = self.damping.iter().zip(&self.stiffness);
+        for (l, (c, k)) in added.hinge.iter_mut().zip(rows.clone()) {
+            *l = hg * c + hg * hg * k;
         }
-        inertia_inward_with(chart.system, &self.pose, Some(&self.added), &mut self.inertia)?;
-        self.closed.as_mut().map_or(Ok(()), |c| c.prepare(chart.system, &self.pose, &self.inertia))
+        for (l, (c, k)) in added.modal.iter_mut().zip(rows.skip(nv)) {
+            *l = 1.0 + hg * c + hg * hg * k;
+        }
+        added.blocks.clear();
+        for own in &self.turning {
+            let Some(mut block) = own.spring else { continue };
+            block.iter_mut().flatten().for_each(|x| *x *= hg * hg);
+            chart.system.bodies[own.body].velocity_range().enumerate().for_each(|(i, v)| block[i][i] += hg * self.damping[v]);
+            added.blocks.push((own.body, block));
+        }
+        self.matrix.factor(chart.system, &chart.base)
     }
 
     /// Turns the rate of y that stands in stage `i` into its `k_i`.
     fn solve_stage(&mut self, chart: &Chart<'_>, i: usize) {
-        let (system, h, g) = (chart.system, self.h, self.tableau.gamma);
-        let (n, nv) = (chart.increments(), system.velocity_count);
+        let (h, g, n) = (self.h, self.tableau.gamma, chart.increments());
+        let nv = chart.system.velocity_count;
         let (done, open) = self.k.split_at_mut(i);
-        let k = &mut open[0];
-        let s = &mut self.s;
-        s.fill(0.0);
+        self.s.fill(0.0);
         for (w, k) in self.tableau.gamma_rows[i].iter().zip(done.iter()) {
-            s.iter_mut().zip(k).for_each(|(s, k)| *s += w * k);
+            self.s.iter_mut().zip(k).for_each(|(s, k)| *s += w * k);
         }
-        for (b, body) in system.bodies.iter().enumerate() {
-            if let Some(flexible) = body.flexible() {
-                for (j, m) in body.modal_range().enumerate() {
-                    let rate = s[n + nv + m] + g * k[n + nv + m];
-                    let way = s[nv + m] + g * k[nv + m] + h * g * rate;
-                    self.response.external_modal[m] = -h * (flexible.stiffness[j] * way + flexible.damping[j] * rate);
-                }
-            }
-            let v = body.velocity_range();
-            let force = &mut self.response.applied[v.clone()];
-            force.fill(0.0);
-            if self.added.hinge[b].is_none() {
-                continue;
-            }
-            let (mut way, mut rate) = ([0.0; MAX_RATES], [0.0; MAX_RATES]);
-            for (i, r) in v.clone().enumerate() {
-                way[i] = s[r] + g * k[r];
-                rate[i] = s[n + r] + g * k[n + r];
-            }
-            turn_travel(body, &self.pose.bodies[b].hinge.rotation.transpose(), &mut way);
-            way.iter_mut().zip(&rate).for_each(|(w, r)| *w += h * g * r);
-            if let Some(spring) = &self.spring[b] {
-                for (f, row) in force.iter_mut().zip(spring) {
-                    *f -= h * row.iter().zip(&way).map(|(k, w)| k * w).sum::<f64>();
-                }
-            }
-            for (f, (c, r)) in force.iter_mut().zip(body.hinge.damping.iter().zip(&rate)) {
-                *f -= h * c * r;
-            }
-        }
-        self.response.solve(system, &self.pose, &self.inertia, &self.all);
-        if let Some(chain) = &mut self.closed {
-            chain.hold(system, &self.pose, &self.inertia, &mut self.response);
-        }
-        k[n..n + nv].iter_mut().zip(&self.response.hinge).for_each(|(k, x)| *k += x);
-        k[n + nv..2 * n].iter_mut().zip(&self.response.modal).for_each(|(k, x)| *k += x);
-        for m in 0..n - nv {
-            k[nv + m] += h * (s[n + nv + m] + g * k[n + nv + m]);
-        }
-        for (b, body) in system.bodies.iter().enumerate().filter(|(_, b)| !b.hinge.is_prescribed()) {
+        let (s_q, s_v) = self.s[..2 * n].split_at(n);
+        let (k_q, k_v) = open[0][..2 * n].split_at_mut(n);
+        let (stiffness, damping) = (&self.stiffness[..n], &self.damping[..n]);
+        let force_on = |j: usize| {
+            let rate = s_v[j] + g * k_v[j];
+            let way = s_q[j] + g * k_q[j] + h * g * rate;
+            -h * (stiffness[j] * way + damping[j] * rate)
+        };
+        let response = &mut self.matrix.response;
+        response.applied.iter_mut().enumerate().for_each(|(j, f)| *f = force_on(j));
+        response.external_modal.iter_mut().enumerate().for_each(|(j, f)| *f = force_on(nv + j));
+        for own in &self.turning {
+            let Some(spring) = &own.spring else { continue };
+            let v = chart.system.bodies[own.body].velocity_range();
             let mut way = [0.0; MAX_RATES];
-            for (i, r) in body.velocity_range().enumerate() {
-                way[i] = h * (s[n + r] + g * k[n + r]);
+            v.clone().zip(&mut way).for_each(|(j, w)| *w = s_q[j] + g * k_q[j]);
+            turn_travel(own.travel.map(|t| t.transpose()), &mut way);
+            v.clone().zip(&mut way).for_each(|(j, w)| *w += h * g * (s_v[j] + g * k_v[j]));
+            for (j, row) in v.zip(spring) {
+                response.applied[j] -= h * row.iter().zip(&way).map(|(k, w)| k * w).sum::<f64>();
             }
-            turn_travel(body, &self.pose.bodies[b].hinge.rotation, &mut way);
-            k[body.velocity_range()].iter_mut().zip(&way).for_each(|(k, w)| *k += w);
+        }
+        self.matrix.solve(chart.system);
+        let response = &self.matrix.response;
+        k_v[..nv].iter_mut().zip(&response.hinge).for_each(|(k, x)| *k += x);
+        k_v[nv..].iter_mut().zip(&response.modal).for_each(|(k, x)| *k += x);
+        // rows of prescribed hinges are zero throughout
+        for j in 0..n {
+            k_q[j] += h * (s_v[j] + g * k_v[j]);
+        }
+        for own in self.turning.iter().filter(|own| own.travel.is_some()) {
+            let v = chart.system.bodies[own.body].velocity_range();
+            let mut way = [0.0; MAX_RATES];
+            v.clone().zip(&mut way).for_each(|(j, w)| *w = h * (s_v[j] + g * k_v[j]));
+            let straight = way;
+            turn_travel(own.travel, &mut way);
+            v.zip(way.iter().zip(&straight)).for_each(|(j, (w, s))| k_q[j] += w - s);
         }
     }
 
@@ -201,24 +193,44 @@ impl RosenbrockW {
     }
 }
 
-/// Between rates and increments of a free hinge: its travel is measured in O axes as a rate, in O+ axes as an increment.
-fn turn_travel(body: &Body, rotation: &Matrix3<f64>, x: &mut [f64; MAX_RATES]) {
-    if matches!(body.hinge.kind, HingeKind::Free) {
+/// Travel of a free hinge from its rates to its increments by `rotation`, or back.
+fn turn_travel(rotation: Option<Matrix3<f64>>, x: &mut [f64; MAX_RATES]) {
+    if let Some(rotation) = rotation {
         let turned = rotation * Vector3::new(x[3], x[4], x[5]);
         x[3..6].copy_from_slice(turned.as_slice());
     }
 }
 
+/// Diagonals of K and C, indexed like increments: zero for prescribed hinges, and K for hinges with a quaternion.
+fn diagonals(system: &System) -> [Vec<f64>; 2] {
+    let nv = system.velocity_count;
+    let mut both = [vec![0.0; nv + system.modal_count], vec![0.0; nv + system.modal_count]];
+    let [stiffness, damping] = &mut both;
+    for body in &system.bodies {
+        if !body.hinge.is_prescribed() {
+            let springs = if body.hinge.kind.has_quaternion() { &[][..] } else { &body.hinge.stiffness };
+            stiffness[body.velocity_range()].iter_mut().zip(springs).for_each(|(own, k)| *own = *k);
+            damping[body.velocity_range()].iter_mut().zip(&body.hinge.damping).for_each(|(own, c)| *own = *c);
+        }
+        if let Some(flexible) = body.flexible() {
+            let modes = nv + body.modal_range().start..nv + body.modal_range().end;
+            stiffness[modes.clone()].copy_from_slice(&flexible.stiffness);
+            damping[modes].copy_from_slice(&flexible.damping);
+        }
+    }
+    both
+}
+
 /// Stiffness `T' diag(k) T` of a hinge's springs on its rates, `T` the rate of the displacement per rate: without the springs' own
 /// force, which turns with a large rotation, so that it is positive semidefinite everywhere.
-fn spring_stiffness(body: &Body, q: &[f64]) -> Option<Block> {
+fn spring_stiffness(body: &Body, q: &[f64]) -> Option<HingeBlock> {
     let (hinge, m) = (&body.hinge, body.hinge.kind.rate_count());
-    if hinge.is_prescribed() || hinge.stiffness.iter().all(|k| *k == 0.0) {
+    if hinge.stiffness.iter().all(|k| *k == 0.0) {
         return None;
     }
     let mut displacement = [0.0; MAX_RATES];
     hinge.kind.displacement(q, &mut displacement[..m]);
-    let mut block = Block::default();
+    let mut block = HingeBlock::default();
     for (c, k) in hinge.stiffness.iter().enumerate() {
         // force on the rates by a unit force on displacement c: row c of T
         let mut row = [0.0; MAX_RATES];
@@ -284,7 +296,7 @@ impl Stepper for RosenbrockW {
         self.y.iter_mut().zip(self.y1.iter().zip(&self.k[STAGES])).for_each(|(y, (y1, e))| *y = y1 - e);
         // modes that the step does not resolve are damped in the solution that goes on, and must be in its error (Hairer and Wanner
         // 1996, IV.8: the estimate is filtered by the matrix of the stages)
-        for (m, lambda) in self.added.modal.iter().enumerate() {
+        for (m, lambda) in self.matrix.added.modal.iter().enumerate() {
             for i in [nv + m, n + nv + m] {
                 self.y[i] = self.y1[i] - self.k[STAGES][i] / lambda;
             }

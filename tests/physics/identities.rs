@@ -85,17 +85,20 @@ fn response_to_generalised_forces_solves_with_the_mass_matrix_and_what_is_added_
         let force: Vec<f64> = (0..n).map(wave).collect();
         // every block: nothing on some hinges, a full matrix on others
         let hinge = |k: usize| {
-            (!k.is_multiple_of(3)).then(|| std::array::from_fn(|i| std::array::from_fn(|j| if i == j { 9.0 } else { wave(i + j) })))
+            let block = std::array::from_fn(|i| std::array::from_fn(|j| if i == j { 9.0 } else { wave(i + j) }));
+            (!k.is_multiple_of(3)).then_some((k, block))
         };
         let added = AddedInertia {
             modal: (0..system.modal_count).map(|j| 1.0 + 50.0 * (j as f64)).collect(),
-            hinge: (0..system.bodies.len()).map(hinge).collect(),
+            hinge: (0..nv).map(|i| 1.0 + wave(i)).collect(),
+            blocks: (0..system.bodies.len()).filter_map(hinge).collect(),
         };
         for added in [None, Some(&added)] {
             let mut matrix = equations.mass.clone();
             if let Some(added) = added {
                 added.modal.iter().enumerate().for_each(|(j, x)| matrix[(nv + j, nv + j)] += x - 1.0);
-                for (body, block) in system.bodies.iter().zip(&added.hinge) {
+                for (k, body) in system.bodies.iter().enumerate() {
+                    let block = added.block(&system, k);
                     for (i, j) in body.velocity_range().flat_map(|i| body.velocity_range().map(move |j| (i, j))) {
                         matrix[(i, j)] += block.map_or(0.0, |b| b[i - body.velocity][j - body.velocity]);
                     }

@@ -16,7 +16,7 @@ use std::time::Instant;
 const EPS: f64 = f64::EPSILON;
 
 /// Trees in which every second hinge is a revolute one, the others of any kind.
-fn random_rigid_tree(seed: u64) -> Definition {
+pub fn random_rigid_tree(seed: u64) -> Definition {
     let recipe = Recipe { bodies: 12, flexible: 0.0, prescribed: 0.2, ..Recipe::default() };
     let mut definition = random_tree(seed, &recipe);
     for hinge in definition.hinges.iter_mut().skip(seed as usize % 2).step_by(2) {
@@ -37,7 +37,7 @@ fn random_rigid_tree(seed: u64) -> Definition {
 }
 
 /// Trees of rigid and flexible bodies that are held by their roots, with children anywhere.
-fn random_flexible_tree(seed: u64) -> Definition {
+pub fn random_flexible_tree(seed: u64) -> Definition {
     let orders = [InertiaOrder::Zeroth, InertiaOrder::First, InertiaOrder::Second];
     let recipe = Recipe {
         bodies: 9,

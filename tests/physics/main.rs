@@ -9,6 +9,7 @@ mod conservation;
 mod convergence;
 mod first_principles;
 mod identities;
+mod implicit_matrix;
 mod kernel;
 mod loop_cost;
 mod loop_runs;

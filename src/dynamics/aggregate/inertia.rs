@@ -209,12 +209,12 @@ impl AggregateInertia {
                     self.row[j] = rotate(&turned, &force_from(&x, &self.row[j]));
                 }
             }
+            let block = added.and_then(|a| a.block(system, k));
             for (i, j) in member.rates.clone().enumerate().filter(|(_, j)| aggregate.free[*j]) {
                 let force = at_hinge.times(&own.hinge.map[i]);
                 self.row[j] = force;
                 for (e, l) in member.rates.clone().enumerate() {
-                    let block = added.and_then(|a| a.hinge[k].as_ref()).map_or(0.0, |n| n[e][i]);
-                    self.mass[(l, j)] = own.hinge.map[e].dot(&force) + block;
+                    self.mass[(l, j)] = own.hinge.map[e].dot(&force) + block.map_or(0.0, |n| n[e][i]);
                 }
             }
             for j in member.modes.clone() {

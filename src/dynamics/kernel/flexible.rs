@@ -21,6 +21,7 @@ use super::{Doubtful, Motion};
 use crate::dynamics::flexible_inertia::FlexibleInertia;
 use crate::dynamics::sweep::force_inward::load_shape;
 use crate::model::{FlexibleBody, InertiaOrder, LoadAxes, State, System};
+use crate::spatial::SpatialInertia;
 use crate::spatial::lanes::Lanes;
 use crate::spatial::shift::{force_from, rotate, rotate_back, spatial};
 use nalgebra::{Matrix3, Vector3, Vector6};
@@ -34,10 +35,10 @@ pub struct FlexibleLink {
     /// B axes to link axes.
     frame: Matrix3<f64>,
     /// O in B (m), and whether it lies elsewhere than B.
-    origin: Vector3<f64>,
-    is_offset: bool,
+    pub origin: Vector3<f64>,
+    pub is_offset: bool,
     /// B axes to inertial axes.
-    rotation: Matrix3<f64>,
+    pub rotation: Matrix3<f64>,
     /// Angular velocity, B axes.
     pub omega: Vector3<f64>,
     /// Acceleration of B, B axes.
@@ -59,13 +60,13 @@ pub struct FlexibleLink {
     /// Rigid rows of b.
     b: Vector6<f64>,
     /// `S~` of all tips.
-    inertia: Vec<Six>,
+    pub inertia: Vec<Six>,
     /// `N` of all pairs of tips, row by row.
-    N: Vec<Six>,
+    pub N: Vec<Six>,
     /// `y` of all tips.
-    y: Vec<[[f64; 4]; 2]>,
+    pub y: Vec<[[f64; 4]; 2]>,
     /// Room to find N of several tips.
-    work: Vec<f64>,
+    pub work: Vec<f64>,
     /// For inertia of order 1 and 2: at the present deformation.
     deformed: Option<Box<Deformed>>,
 }
@@ -326,6 +327,18 @@ impl FlexibleLink {
                 moved = [s.sub(moved[0], held[0]), s.sub(moved[1], held[1])];
             }
             tip.accelerate(s, &self.rotation, alpha, moved);
+        }
+    }
+
+    /// `M_fr` and `M_rr` at the deformation of the first pass.
+    #[inline(always)]
+    pub fn present<'a>(&'a mut self, shape: &'a ModalShape) -> (&'a [Block<6>], &'a SpatialInertia) {
+        match &mut self.deformed {
+            None => (&shape.rows, &shape.rigid),
+            Some(now) => {
+                now.gather_rows();
+                (&now.rows, &now.inertia.rigid)
+            }
         }
     }
 

@@ -4,7 +4,7 @@ use super::flexible::FlexibleLink;
 use super::layout::{Layout, Passage, Shape};
 use super::record::Motion;
 use super::{Doubtful, carrier};
-use crate::dynamics::sweep::inertia_inward::{BodyInertia, SINGULAR, eliminate_hinge, solve_hinge};
+use crate::dynamics::sweep::inertia_inward::{BodyInertia, HingeBlock, SINGULAR, eliminate_hinge, solve_hinge};
 use crate::model::hinge::{HingePose, MAX_RATES};
 use crate::model::{HingeKind, LoadAxes, LoadPoint, State, System};
 use crate::spatial::SpatialInertia;
@@ -33,6 +33,8 @@ pub struct GeneralHinge {
     applied: [f64; MAX_RATES],
     nu: [f64; MAX_RATES],
     inertia: BodyInertia,
+    /// True if nothing but the forces on its rates passes the hinge in a response.
+    releases: bool,
 }
 
 impl GeneralHinge {
@@ -52,6 +54,7 @@ impl GeneralHinge {
             applied: [0.0; MAX_RATES],
             nu: [0.0; MAX_RATES],
             inertia: BodyInertia::default(),
+            releases: false,
         }
     }
 
@@ -104,6 +107,12 @@ impl GeneralHinge {
         if body.hinge.is_prescribed() {
             return Ok((left, force + left.times(&self.bias)));
         }
+        let z = self.pass_force(m, force);
+        Ok((left, z + left.times(&self.bias)))
+    }
+
+    /// `z + G epsilon`, and `nu`, of the `m` forces in `applied`.
+    fn pass_force(&mut self, m: usize, force: &Vector6<f64>) -> Vector6<f64> {
         let mut z = *force;
         for i in 0..m {
             let epsilon = self.applied[i] - self.map[i].dot(force);
@@ -111,7 +120,7 @@ impl GeneralHinge {
             z += self.inertia.G[i] * epsilon;
         }
         solve_hinge(&self.inertia.D, &mut self.nu[..m]);
-        Ok((left, z + left.times(&self.bias)))
+        z
     }
 
     /// Forces on the rates at `state`; returns the number of rates.
@@ -141,6 +150,34 @@ impl GeneralHinge {
             self.nu[i] = self.map[i].dot(&free);
         }
         Ok(felt)
+    }
+
+    /// `P+` from `P` with `added` on the hinge's own inertia: for responses, after the first pass.
+    pub fn factor(&mut self, system: &System, inertia: &SpatialInertia, added: Option<&HingeBlock>) -> Result<SpatialInertia, Doubtful> {
+        let body = &system.bodies[self.body];
+        self.releases = matches!(body.hinge.kind, HingeKind::Free) && !body.hinge.is_prescribed() && added.is_none();
+        self.inertia.P_hinge = *inertia;
+        eliminate_hinge(body, &self.map, added, &mut self.inertia, |_| f64::INFINITY).map_err(|_| Doubtful)?;
+        Ok(self.inertia.P_plus)
+    }
+
+    /// A response inward: `z+` from `z` under the forces `applied` on the rates.
+    pub fn respond(&mut self, system: &System, applied: &[f64], force: &Vector6<f64>) -> Vector6<f64> {
+        if system.bodies[self.body].hinge.is_prescribed() {
+            return *force;
+        }
+        self.applied[..applied.len()].copy_from_slice(applied);
+        let z = self.pass_force(applied.len(), force);
+        if !self.releases {
+            return z;
+        }
+        let felt = Vector6::from(self.applied);
+        spatial(&(self.rotation * angular(&felt)), &(self.rotation * linear(&felt)))
+    }
+
+    /// A response outward: as [`Self::accelerate`], but prescribed hinges do not move. The others have no bias, since they were posed at rest.
+    pub fn follow_response(&self, system: &System, outer: &Vector6<f64>, hinge: &mut [f64]) -> Vector6<f64> {
+        if system.bodies[self.body].hinge.is_prescribed() { *outer } else { self.accelerate(system, outer, hinge) }
     }
 
     /// Third pass: the body's acceleration from that of O+ at O; writes the accelerations of the rates.

@@ -1,6 +1,6 @@
 //! Second pass: articulated inertias and residual forces, from the tips to the base. Source: Paper Eq. 9 to 12, in inertial axes.
 
-use super::cyclic::{Inertia, Turns, general_product, square, symmetric_product, symmetric_times, transposed_times};
+use super::cyclic::{Inertia, Symmetric, Turns, general_product, square, symmetric_product, symmetric_times, transposed_times};
 use super::hinge::external_force;
 use super::layout::{Passage, Shape};
 use super::record::{Hinge, Outboard, block};
@@ -16,7 +16,7 @@ use nalgebra::Matrix3;
 /// Inertia and residual force in registers.
 #[derive(Clone, Copy)]
 pub struct Felt<V> {
-    inertia: Inertia<V>,
+    pub inertia: Inertia<V>,
     moment: V,
     force: V,
 }
@@ -110,9 +110,30 @@ pub fn inward<L: Lanes, const LOADS: bool>(s: L, tree: &mut TreeKernel, system: 
     Ok(())
 }
 
+/// Adds a rigid body at `turn` to `inertia`; what it has for itself: rotational inertia about O, first moment.
+#[inline(always)]
+pub fn add_rigid<L: Lanes>(s: L, shape: &Shape, turn: [L::V; 3], inertia: &mut Inertia<L::V>) -> (Symmetric<L::V>, L::V) {
+    let i = &shape.inertia;
+    // R I R'
+    let half: [L::V; 3] = [
+        s.combine_numbers(turn, [i[0], i[1], i[2]]),
+        s.combine_numbers(turn, [i[3], i[4], i[5]]),
+        s.combine_numbers(turn, [i[6], i[7], i[8]]),
+    ];
+    let own = symmetric_product(s, half, turn);
+    let first_moment = Turns::new(s, s.combine_numbers(turn, shape.first_moment));
+    let Inertia { rotational, coupling, translational } = inertia;
+    *rotational = [s.add(rotational[0], own[0]), s.add(rotational[1], own[1])];
+    // its tilde matrix
+    coupling[1] = s.sub(coupling[1], first_moment.zxy);
+    coupling[2] = s.add(coupling[2], first_moment.yzx);
+    translational[0] = s.add(translational[0], s.splat(shape.mass));
+    (own, first_moment.x)
+}
+
 impl<V: Copy> Felt<V> {
     #[inline(always)]
-    fn none<L: Lanes<V = V>>(s: L) -> Self {
+    pub fn none<L: Lanes<V = V>>(s: L) -> Self {
         let zero = s.splat(0.0);
         let inertia = Inertia { rotational: [zero; 2], coupling: [zero; 3], translational: [zero; 2] };
         Self { inertia, moment: zero, force: zero }
@@ -121,23 +142,9 @@ impl<V: Copy> Felt<V> {
     /// Adds the body itself: its inertia about O, and what its motion asks for.
     #[inline(always)]
     fn add_body<L: Lanes<V = V>>(&mut self, s: L, shape: &Shape, turn: [V; 3], omega: V) {
-        let i = &shape.inertia;
-        // R I R'
-        let half: [V; 3] = [
-            s.combine_numbers(turn, [i[0], i[1], i[2]]),
-            s.combine_numbers(turn, [i[3], i[4], i[5]]),
-            s.combine_numbers(turn, [i[6], i[7], i[8]]),
-        ];
-        let own = symmetric_product(s, half, turn);
-        let first_moment = Turns::new(s, s.combine_numbers(turn, shape.first_moment));
+        let (own, first_moment) = add_rigid(s, shape, turn, &mut self.inertia);
         self.moment = s.add(self.moment, s.cross(omega, symmetric_times(s, own, omega)));
-        self.force = s.add(self.force, s.cross(omega, s.cross(omega, first_moment.x)));
-        let Inertia { rotational, coupling, translational } = &mut self.inertia;
-        *rotational = [s.add(rotational[0], own[0]), s.add(rotational[1], own[1])];
-        // its tilde matrix
-        coupling[1] = s.sub(coupling[1], first_moment.zxy);
-        coupling[2] = s.add(coupling[2], first_moment.yzx);
-        translational[0] = s.add(translational[0], s.splat(shape.mass));
+        self.force = s.add(self.force, s.cross(omega, s.cross(omega, first_moment)));
     }
 
     /// Through a revolute hinge about `axis` with the torque `applied`: what is left is `P+` and `z+`, which are put into `place` as soon as

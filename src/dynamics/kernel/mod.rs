@@ -12,7 +12,7 @@
 //! | the same, where loads are asked for | `Outboard` | 36 |
 //! | `accelerate`: accelerations, and `Load`s if asked for | `Load` | 8 |
 //!
-//! Modes are the business of `flexible`, in the axes of each body.
+//! What implicit steps ask for, responses to generalised forces, is [`response`]. Modes are the business of `flexible`, in the axes of each body.
 //!
 //! Bodies that are alike share their constants. A child that follows its parent in the order, as in every chain, finds the
 //! parent's quantities in registers; only branching bodies keep theirs in memory.
@@ -28,6 +28,7 @@ mod layout;
 mod modal_shape;
 mod outward;
 mod record;
+pub mod response;
 mod rows;
 mod six;
 mod tip;

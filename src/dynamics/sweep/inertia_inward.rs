@@ -86,13 +86,41 @@ pub struct InertiaScratch {
     children: Vec<Vec<usize>>,
 }
 
+/// A symmetric block of one hinge's rates.
+pub type HingeBlock = [[f64; MAX_RATES]; MAX_RATES];
+
 /// What a linearly implicit integrator adds to the mass matrix.
 #[derive(Debug, Clone)]
 pub struct AddedInertia {
     /// `Lambda`: unit modal mass plus what is added, indexed like the modal coordinates.
     pub modal: Vec<f64>,
-    /// Symmetric positive semidefinite block of each body's hinge rates; none for zero.
-    pub hinge: Vec<Option<[[f64; MAX_RATES]; MAX_RATES]>>,
+    /// What is added on the diagonal of the hinge rates, not negative, indexed like them.
+    pub hinge: Vec<f64>,
+    /// In place of that, whole positive semidefinite blocks of the hinges of some bodies, which ascend.
+    pub blocks: Vec<(usize, HingeBlock)>,
+}
+
+impl AddedInertia {
+    /// Nothing.
+    #[must_use]
+    pub fn none(system: &System) -> Self {
+        Self { modal: vec![1.0; system.modal_count], hinge: vec![0.0; system.velocity_count], blocks: vec![] }
+    }
+
+    /// What is added on the hinge of body `k`; none for zero.
+    #[must_use]
+    pub fn block(&self, system: &System, k: usize) -> Option<HingeBlock> {
+        if let Ok(place) = self.blocks.binary_search_by_key(&k, |b| b.0) {
+            return Some(self.blocks[place].1);
+        }
+        let diagonal = &self.hinge[system.bodies[k].velocity_range()];
+        if diagonal.iter().all(|d| *d == 0.0) {
+            return None;
+        }
+        let mut block = HingeBlock::default();
+        diagonal.iter().enumerate().for_each(|(i, d)| block[i][i] = *d);
+        Some(block)
+    }
 }
 
 impl InertiaScratch {
@@ -178,7 +206,7 @@ pub fn inertia_inward_with(
         } else {
             out.bodies[k].P_hinge = out.bodies[k].P;
         }
-        let block = added.and_then(|a| a.hinge[k].as_ref());
+        let block = added.and_then(|a| a.block(system, k));
         let map = &pose.bodies[k].hinge.map;
         let children = &out.children;
         let (inner, outer) = out.bodies.split_at_mut(k + 1);
@@ -188,7 +216,7 @@ pub fn inertia_inward_with(
         let terms = |h: &Vector6<f64>| if exact { sum_of_terms(system, pose, k, h, &children[k], outer) } else { f64::INFINITY };
         match out.graded.as_deref_mut().filter(|_| added.is_none()) {
             Some(graded) => graded.eliminate(system, pose, k, &children[k], own),
-            None => eliminate_hinge(body, map, block, own, terms),
+            None => eliminate_hinge(body, map, block.as_ref(), own, terms),
         }
         .map_err(|pivot| DynamicsError::of_hinge(system, pose, k, pivot))?;
         if let Some(parent) = body.parent {
@@ -368,7 +396,7 @@ pub(super) fn rough_size(P: &SpatialInertia, h: &Vector6<f64>) -> f64 {
 pub(in crate::dynamics) fn eliminate_hinge(
     body: &Body,
     map: &[Vector6<f64>; MAX_RATES],
-    added: Option<&[[f64; MAX_RATES]; MAX_RATES]>,
+    added: Option<&HingeBlock>,
     own: &mut BodyInertia,
     terms: impl Fn(&Vector6<f64>) -> f64,
 ) -> Result<(), SingularPivot> {
