@@ -4,6 +4,7 @@
 //! rotations are rotation vectors with rate `Jr^-1 omega`, so y starts at zero increments in every step (a Munthe-Kaas method).
 
 use crate::dynamics::{DynamicsError, Workspace, accelerations, energy};
+use crate::model::hinge::MAX_RATES;
 use crate::model::{State, System};
 use std::time::{Duration, Instant};
 
@@ -30,6 +31,10 @@ pub struct Chart<'a> {
     /// The last evaluation.
     pub workspace: Workspace,
     state: State,
+    /// Coordinates that are sums of their increments, as runs: the first, its increment, their number.
+    straight: Vec<[usize; 3]>,
+    /// Bodies whose hinge has others.
+    turning: Vec<usize>,
 }
 
 impl<'a> Chart<'a> {
@@ -46,6 +51,8 @@ impl<'a> Chart<'a> {
             nearest_rank_loss: [f64::INFINITY; 2],
             workspace: Workspace::new(system),
             state: start.clone(),
+            straight: straight_runs(system),
+            turning: (0..system.bodies.len()).filter(|&k| system.bodies[k].hinge.kind.has_quaternion()).collect(),
         }
     }
 
@@ -80,7 +87,11 @@ impl<'a> Chart<'a> {
     pub fn state_of(&self, time: f64, y: &[f64], out: &mut State) {
         let (n, nv) = (self.increments(), self.system.velocity_count);
         out.time = time;
-        for body in &self.system.bodies {
+        for &[q, v, count] in &self.straight {
+            let sums = self.base.position[q..q + count].iter().zip(&y[v..v + count]);
+            out.position[q..q + count].iter_mut().zip(sums).for_each(|(o, (q, d))| *o = q + d);
+        }
+        for body in self.turning.iter().map(|&k| &self.system.bodies[k]) {
             let (q, v) = (body.position_range(), body.velocity_range());
             body.hinge.kind.advance(&self.base.position[q.clone()], &y[v], &mut out.position[q]);
         }
@@ -120,15 +131,7 @@ impl<'a> Chart<'a> {
         self.nearest_rank_loss = [all.min(self.workspace.distance_to_rank_loss()), cut.min(self.workspace.cut_distance_to_rank_loss())];
         done?;
         let (n, nv) = (self.increments(), self.system.velocity_count);
-        for body in &self.system.bodies {
-            let v = body.velocity_range();
-            if body.hinge.is_prescribed() {
-                rate[v].fill(0.0);
-            } else {
-                let q = &state.position[body.position_range()];
-                body.hinge.kind.increment_rate(q, &y[v.clone()], &state.velocity[v.clone()], &mut rate[v]);
-            }
-        }
+        self.increment_rates(state, Some(y), rate);
         rate[nv..n].copy_from_slice(&state.modal_velocity);
         rate[n..n + nv].copy_from_slice(&self.workspace.acceleration.hinge);
         rate[n + nv..2 * n].copy_from_slice(&self.workspace.acceleration.modal);
@@ -138,6 +141,19 @@ impl<'a> Chart<'a> {
         }
         rate[2 * n] = energy::power(self.system, state, &self.workspace);
         Ok(())
+    }
+
+    /// Rates of the increments `y` (zero if there are none) of the hinges, which have led to `state`, into `rate`.
+    fn increment_rates(&self, state: &State, y: Option<&[f64]>, rate: &mut [f64]) {
+        rate[..self.system.velocity_count].copy_from_slice(&state.velocity);
+        for body in self.turning.iter().map(|&k| &self.system.bodies[k]) {
+            let (q, v) = (&state.position[body.position_range()], body.velocity_range());
+            let delta = y.map_or(&[0.0; MAX_RATES][..v.len()], |y| &y[v.clone()]);
+            body.hinge.kind.increment_rate(q, delta, &state.velocity[v.clone()], &mut rate[v]);
+        }
+        for &k in &self.system.prescribed {
+            rate[self.system.bodies[k].velocity_range()].fill(0.0);
+        }
     }
 
     /// Moves the base to the state that y stands for `h` (s) later, and the rate of y to the new chart's.
@@ -159,13 +175,19 @@ impl<'a> Chart<'a> {
         std::mem::swap(&mut self.base, &mut state);
         self.state = state;
         self.work = y[2 * self.increments()];
-        let zero = [0.0; crate::model::hinge::MAX_RATES];
-        for body in &self.system.bodies {
-            let v = body.velocity_range();
-            if !body.hinge.is_prescribed() {
-                let q = &self.base.position[body.position_range()];
-                body.hinge.kind.increment_rate(q, &zero[..v.len()], &self.base.velocity[v.clone()], &mut rate[v]);
-            }
+        self.increment_rates(&self.base, None, rate);
+    }
+}
+
+/// Runs of hinge coordinates that are sums of their increments, with a quaternion between them: first coordinate, first increment, number.
+fn straight_runs(system: &System) -> Vec<[usize; 3]> {
+    let mut runs: Vec<[usize; 3]> = vec![];
+    for body in system.bodies.iter().filter(|b| !b.hinge.kind.has_quaternion()) {
+        let (q, v) = (body.position_range(), body.velocity_range());
+        match runs.last_mut() {
+            Some([first, _, count]) if *first + *count == q.start => *count += q.len(),
+            _ => runs.push([q.start, v.start, q.len()]),
         }
     }
+    runs
 }

@@ -216,3 +216,40 @@ fn a_stage_costs_at_most_2_2_evaluations_on_trees_of_every_kind() {
     }
     assert!(dear.is_empty(), "{dear:?}");
 }
+
+#[test]
+#[ignore = "prints times"]
+fn time_of_the_parts_of_a_stage() {
+    for count in [8, 32, 1000] {
+        let (system, start) = sprung(rods(&vec![(1.0, 1.0); count])).build().unwrap();
+        let [mut with, mut without] = [Workspace::new(&system), Workspace::without_loads(&system)];
+        let mut chart = Chart::new(&system, &start);
+        let (mut y, mut rate) = (vec![0.0; chart.len()], vec![0.0; chart.len()]);
+        chart.base_vector(&mut y);
+        let mut matrix = ImplicitMatrix::new(&system);
+        matrix.added.hinge.fill(0.1);
+        matrix.factor(&system, &start).unwrap();
+        matrix.response.applied.fill(1.0);
+        let mut least = [f64::INFINITY; 5];
+        for _ in 0..300 {
+            for (i, least) in least.iter_mut().enumerate() {
+                let calls = 10_000 / count;
+                let begin = Instant::now();
+                for _ in 0..calls {
+                    match i {
+                        0 => accelerations(&system, &start, &mut with).unwrap(),
+                        1 => accelerations(&system, &start, &mut without).unwrap(),
+                        2 => chart.rate(0.0, &y, &mut rate).unwrap(),
+                        3 => matrix.factor(&system, &start).unwrap(),
+                        _ => matrix.solve(&system),
+                    }
+                }
+                *least = least.min(begin.elapsed().as_secs_f64() / (calls * count) as f64);
+            }
+        }
+        let [loads, bare, rate, factor, solve] = least.map(|t| t * 1e9);
+        println!(
+            "{count} rods, ns per rod: evaluation {loads:.1}, without loads {bare:.1}, chart {rate:.1}, factors {factor:.1}, response {solve:.1}"
+        );
+    }
+}
