@@ -76,8 +76,9 @@ fn evaluations_and_hinge_loads_allocate_nothing() {
 #[test]
 fn steps_of_the_linearly_implicit_method_allocate_nothing() {
     let recipe = Recipe { bodies: 12, prescribed: 0.2, ..Recipe::default() };
-    for seed in 0..5 {
-        let (system, mut start) = random_tree(seed, &recipe).build().unwrap();
+    let by_kernel = Recipe { flexible: 0.0, ..recipe };
+    for (seed, recipe) in (0..5).flat_map(|seed| [(seed, &recipe), (seed, &by_kernel)]) {
+        let (system, mut start) = random_tree(seed, recipe).build().unwrap();
         start.apply_prescribed(&system);
         let mut chart = Chart::new(&system, &start);
         let mut stepper = RosenbrockW::new(ROS34PW2, Tolerance { relative: 1e-3, absolute: 1e-3 }, &chart);

@@ -6,9 +6,10 @@
 //! sweeps themselves, cut ones by multipliers.
 
 use super::DynamicsError;
+use super::added_inertia::AddedInertia;
 use super::closed_chain::ClosedChain;
 use super::kernel::response::TreeResponse;
-use super::sweep::inertia_inward::{AddedInertia, InertiaScratch, inertia_inward_with};
+use super::sweep::inertia_inward::{InertiaScratch, inertia_inward_with};
 use super::sweep::pose_outward::{PoseScratch, pose_outward};
 use super::sweep::response::Response;
 use crate::model::{State, System};

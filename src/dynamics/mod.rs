@@ -41,6 +41,7 @@
 //! `Pi(eta) = [Jl(Phi_r eta) Phi_r; Phi_t]`, the rate of the finite rotation `exp(Phi_r eta)`, so that energy is conserved to the
 //! integrator's order. Gravity acts as the acceleration `-g` of the world, so `alpha` holds what an accelerometer would feel.
 
+pub mod added_inertia;
 pub mod aggregate;
 pub mod closed_chain;
 pub mod dense;

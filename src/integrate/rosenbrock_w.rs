@@ -36,8 +36,8 @@ use super::runge_kutta::{combine, hermite};
 use super::step_control::{Tolerance, error_norm};
 use super::w_tableau::{STAGES, WTableau};
 use crate::dynamics::DynamicsError;
+use crate::dynamics::added_inertia::HingeBlock;
 use crate::dynamics::implicit_matrix::ImplicitMatrix;
-use crate::dynamics::sweep::inertia_inward::HingeBlock;
 use crate::model::hinge::{MAX_RATES, quaternion_in};
 use crate::model::{Body, HingeKind, State, System};
 use crate::spatial::rotation::matrix_of_quaternion;
@@ -89,6 +89,9 @@ impl RosenbrockW {
         let turns = |(body, b): (usize, &Body)| {
             (b.hinge.kind.has_quaternion() && !b.hinge.is_prescribed()).then_some(TurningHinge { body, travel: None, spring: None })
         };
+        let turning: Vec<_> = system.bodies.iter().enumerate().filter_map(turns).collect();
+        let mut matrix = ImplicitMatrix::new(system);
+        matrix.added.blocks.reserve(turning.len());
         Self {
             tableau,
             tolerance,
@@ -103,8 +106,8 @@ impl RosenbrockW {
             end: chart.base.clone(),
             stiffness,
             damping,
-            turning: system.bodies.iter().enumerate().filter_map(turns).collect(),
-            matrix: ImplicitMatrix::new(system),
+            turning,
+            matrix,
         }
     }
 
@@ -150,15 +153,18 @@ impl RosenbrockW {
         }
         let (s_q, s_v) = self.s[..2 * n].split_at(n);
         let (k_q, k_v) = open[0][..2 * n].split_at_mut(n);
-        let (stiffness, damping) = (&self.stiffness[..n], &self.damping[..n]);
-        let force_on = |j: usize| {
-            let rate = s_v[j] + g * k_v[j];
-            let way = s_q[j] + g * k_q[j] + h * g * rate;
-            -h * (stiffness[j] * way + damping[j] * rate)
-        };
         let response = &mut self.matrix.response;
-        response.applied.iter_mut().enumerate().for_each(|(j, f)| *f = force_on(j));
-        response.external_modal.iter_mut().enumerate().for_each(|(j, f)| *f = force_on(nv + j));
+        for (forces, first) in [(&mut response.applied, 0), (&mut response.external_modal, nv)] {
+            // slices of one length need no check of an index in the loop
+            let rows = first..first + forces.len();
+            let ([s_q, s_v], [k_q, k_v]) = ([&s_q[rows.clone()], &s_v[rows.clone()]], [&k_q[rows.clone()], &k_v[rows.clone()]]);
+            let (stiffness, damping) = (&self.stiffness[rows.clone()], &self.damping[rows]);
+            for j in 0..forces.len() {
+                let rate = s_v[j] + g * k_v[j];
+                let way = s_q[j] + g * k_q[j] + h * g * rate;
+                forces[j] = -h * (stiffness[j] * way + damping[j] * rate);
+            }
+        }
         for own in &self.turning {
             let Some(spring) = &own.spring else { continue };
             let v = chart.system.bodies[own.body].velocity_range();

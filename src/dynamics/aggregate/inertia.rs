@@ -6,7 +6,8 @@
 #![expect(non_snake_case, reason = "symbols follow the table in dynamics/aggregate/mod.rs")]
 
 use super::embedding::Embedding;
-use crate::dynamics::sweep::inertia_inward::{AddedInertia, BodyInertia, FlexibleElimination, SINGULAR};
+use crate::dynamics::added_inertia::AddedInertia;
+use crate::dynamics::sweep::inertia_inward::{BodyInertia, FlexibleElimination, SINGULAR};
 use crate::dynamics::sweep::pose_outward::PoseScratch;
 use crate::model::{Aggregate, System};
 use crate::spatial::SpatialInertia;

@@ -14,6 +14,7 @@
 use super::graded::GradedInertia;
 use super::pose_outward::PoseScratch;
 use crate::dynamics::DynamicsError;
+use crate::dynamics::added_inertia::{AddedInertia, HingeBlock};
 use crate::dynamics::aggregate::inertia::AggregateInertia;
 use crate::dynamics::modal_block::{ModalBlock, SingularBlock, outer_sum};
 use crate::model::hinge::MAX_RATES;
@@ -84,43 +85,6 @@ pub struct InertiaScratch {
     pub graded: Option<Box<GradedInertia>>,
     /// Per body: its children, for those whose hinge inertia is doubtful.
     children: Vec<Vec<usize>>,
-}
-
-/// A symmetric block of one hinge's rates.
-pub type HingeBlock = [[f64; MAX_RATES]; MAX_RATES];
-
-/// What a linearly implicit integrator adds to the mass matrix.
-#[derive(Debug, Clone)]
-pub struct AddedInertia {
-    /// `Lambda`: unit modal mass plus what is added, indexed like the modal coordinates.
-    pub modal: Vec<f64>,
-    /// What is added on the diagonal of the hinge rates, not negative, indexed like them.
-    pub hinge: Vec<f64>,
-    /// In place of that, whole positive semidefinite blocks of the hinges of some bodies, which ascend.
-    pub blocks: Vec<(usize, HingeBlock)>,
-}
-
-impl AddedInertia {
-    /// Nothing.
-    #[must_use]
-    pub fn none(system: &System) -> Self {
-        Self { modal: vec![1.0; system.modal_count], hinge: vec![0.0; system.velocity_count], blocks: vec![] }
-    }
-
-    /// What is added on the hinge of body `k`; none for zero.
-    #[must_use]
-    pub fn block(&self, system: &System, k: usize) -> Option<HingeBlock> {
-        if let Ok(place) = self.blocks.binary_search_by_key(&k, |b| b.0) {
-            return Some(self.blocks[place].1);
-        }
-        let diagonal = &self.hinge[system.bodies[k].velocity_range()];
-        if diagonal.iter().all(|d| *d == 0.0) {
-            return None;
-        }
-        let mut block = HingeBlock::default();
-        diagonal.iter().enumerate().for_each(|(i, d)| block[i][i] = *d);
-        Some(block)
-    }
 }
 
 impl InertiaScratch {

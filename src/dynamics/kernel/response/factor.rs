@@ -1,12 +1,13 @@
 //! Articulated inertias and what hinges make of them, from the tips to the base. Source: Paper Eq. 9, 10 and 32, in inertial axes.
 
 use super::{Factor, Outboard, Passage, TreeResponse};
+use crate::dynamics::added_inertia::AddedInertia;
 use crate::dynamics::kernel::cyclic::{Inertia, Turns, square, symmetric_times, transposed_times};
 use crate::dynamics::kernel::inward::{Felt, add_rigid};
 use crate::dynamics::kernel::layout::Shape;
 use crate::dynamics::kernel::record::block;
 use crate::dynamics::kernel::{Doubtful, TreeKernel, arm, parent_motion};
-use crate::dynamics::sweep::inertia_inward::{AddedInertia, SINGULAR};
+use crate::dynamics::sweep::inertia_inward::SINGULAR;
 use crate::model::System;
 use crate::spatial::lanes::Lanes;
 use nalgebra::Vector6;

@@ -56,6 +56,9 @@ impl FlexibleFactor {
         shape: &ModalShape,
         lambda: &[f64],
     ) -> Result<Inertia<L::V>, Doubtful> {
+        if !lambda.iter().all(|l| *l > 0.0) {
+            return Err(Doubtful);
+        }
         fill(lambda, &mut self.scale);
         for x in self.scale.as_flattened_mut().iter_mut().take(lambda.len()) {
             *x = 1.0 / x.sqrt();

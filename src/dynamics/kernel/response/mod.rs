@@ -23,7 +23,7 @@ mod solve;
 use super::layout::Passage;
 use super::record::{Outboard, Quad};
 use super::{Doubtful, TreeKernel, outward};
-use crate::dynamics::sweep::inertia_inward::AddedInertia;
+use crate::dynamics::added_inertia::AddedInertia;
 use crate::model::{State, System};
 use crate::spatial::lanes::{Kernel, Lanes, Processor};
 use flexible::FlexibleFactor;
