@@ -219,7 +219,7 @@ fn systems() -> Vec<(String, (System, State))> {
 fn a_stage_costs_at_most_2_2_evaluations_on_trees_of_every_kind() {
     let mut dear = vec![];
     for (name, (system, start)) in systems() {
-        let [evaluation, stage] = times(&system, &start, 100);
+        let [evaluation, stage] = times(&system, &start, 60);
         let ratio = stage / evaluation;
         println!("{name}: evaluation {:.2} us, stage {ratio:.2} of it", evaluation * 1e6);
         if ratio > 2.2 {
