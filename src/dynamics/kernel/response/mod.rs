@@ -7,7 +7,7 @@
 //!
 //! | pass | leaves | numbers per body |
 //! |---|---|---|
-//! | `factor`: poses, articulated inertias | [`Factor`] | 16 |
+//! | `factor`: poses, articulated inertias | `Factor` | 16 |
 //! | `inward`: residual forces | `nu` | 1 per rate |
 //! | `outward`: accelerations | the response | 1 per rate |
 //!
