@@ -132,6 +132,18 @@ impl<V: Copy> Inertia<V> {
         Self { rotational: [own, side], coupling: a, translational: t }
     }
 
+    /// The same with a rigid body: its inertia about O, first moment and mass.
+    #[inline(always)]
+    pub fn with_rigid<L: Lanes<V = V>>(&self, s: L, own: Symmetric<V>, first_moment: &Turns<V>, mass: f64) -> Self {
+        let (r, c, t) = (self.rotational, self.coupling, self.translational);
+        Self {
+            rotational: [s.add(r[0], own[0]), s.add(r[1], own[1])],
+            // the tilde matrix of its first moment
+            coupling: [c[0], s.sub(c[1], first_moment.zxy), s.add(c[2], first_moment.yzx)],
+            translational: [s.add(t[0], s.splat(mass)), t[1]],
+        }
+    }
+
     /// The sum of two.
     #[inline(always)]
     pub fn plus<L: Lanes<V = V>>(&self, s: L, other: &Self) -> Self {

@@ -110,9 +110,9 @@ pub fn inward<L: Lanes, const LOADS: bool>(s: L, tree: &mut TreeKernel, system: 
     Ok(())
 }
 
-/// Adds a rigid body at `turn` to `inertia`; what it has for itself: rotational inertia about O, first moment.
+/// Rotational inertia about O and first moment of a rigid body at `turn`.
 #[inline(always)]
-pub fn add_rigid<L: Lanes>(s: L, shape: &Shape, turn: [L::V; 3], inertia: &mut Inertia<L::V>) -> (Symmetric<L::V>, L::V) {
+pub fn rigid_inertia<L: Lanes>(s: L, shape: &Shape, turn: [L::V; 3]) -> (Symmetric<L::V>, Turns<L::V>) {
     let i = &shape.inertia;
     // R I R'
     let half: [L::V; 3] = [
@@ -121,14 +121,7 @@ pub fn add_rigid<L: Lanes>(s: L, shape: &Shape, turn: [L::V; 3], inertia: &mut I
         s.combine_numbers(turn, [i[6], i[7], i[8]]),
     ];
     let own = symmetric_product(s, half, turn);
-    let first_moment = Turns::new(s, s.combine_numbers(turn, shape.first_moment));
-    let Inertia { rotational, coupling, translational } = inertia;
-    *rotational = [s.add(rotational[0], own[0]), s.add(rotational[1], own[1])];
-    // its tilde matrix
-    coupling[1] = s.sub(coupling[1], first_moment.zxy);
-    coupling[2] = s.add(coupling[2], first_moment.yzx);
-    translational[0] = s.add(translational[0], s.splat(shape.mass));
-    (own, first_moment.x)
+    (own, Turns::new(s, s.combine_numbers(turn, shape.first_moment)))
 }
 
 impl<V: Copy> Felt<V> {
@@ -142,9 +135,10 @@ impl<V: Copy> Felt<V> {
     /// Adds the body itself: its inertia about O, and what its motion asks for.
     #[inline(always)]
     fn add_body<L: Lanes<V = V>>(&mut self, s: L, shape: &Shape, turn: [V; 3], omega: V) {
-        let (own, first_moment) = add_rigid(s, shape, turn, &mut self.inertia);
+        let (own, first_moment) = rigid_inertia(s, shape, turn);
         self.moment = s.add(self.moment, s.cross(omega, symmetric_times(s, own, omega)));
-        self.force = s.add(self.force, s.cross(omega, s.cross(omega, first_moment)));
+        self.force = s.add(self.force, s.cross(omega, s.cross(omega, first_moment.x)));
+        self.inertia = self.inertia.with_rigid(s, own, &first_moment, shape.mass);
     }
 
     /// Through a revolute hinge about `axis` with the torque `applied`: what is left is `P+` and `z+`, which are put into `place` as soon as

@@ -3,7 +3,7 @@
 use super::{Factor, Outboard, Passage, TreeResponse};
 use crate::dynamics::added_inertia::AddedInertia;
 use crate::dynamics::kernel::cyclic::{Inertia, Turns, square, symmetric_times, transposed_times};
-use crate::dynamics::kernel::inward::{Felt, add_rigid};
+use crate::dynamics::kernel::inward::{Felt, rigid_inertia};
 use crate::dynamics::kernel::layout::Shape;
 use crate::dynamics::kernel::record::block;
 use crate::dynamics::kernel::{Doubtful, TreeKernel, arm, parent_motion};
@@ -37,7 +37,8 @@ pub fn factor<L: Lanes>(s: L, of: &mut TreeResponse, system: &System, added: &Ad
             let of_modes = &mut modal_factors[link.flexible as usize];
             felt = felt.plus(s, &of_modes.factor(s, own, constants, lambda)?);
         } else {
-            add_rigid(s, shape, turn, &mut felt);
+            let (own, first_moment) = rigid_inertia(s, shape, turn);
+            felt = felt.with_rigid(s, own, &first_moment, shape.mass);
         }
 
         let l = if link.passage == Passage::General {

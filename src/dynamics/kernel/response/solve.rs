@@ -94,10 +94,7 @@ pub fn outward<L: Lanes>(s: L, of: &mut TreeResponse, system: &System, hinge: &m
             (angular, linear) = (s.of_three([a[0], a[1], a[2]]), s.of_three([a[3], a[4], a[5]]));
         } else if link.parent != last {
             (angular, linear) = match layout.links.get(link.parent as usize).and_then(|p| branches.get(p.branch as usize)) {
-                Some(branch) => {
-                    let a = &branch.acceleration;
-                    (s.of_three([a[0], a[1], a[2]]), s.of_three([a[3], a[4], a[5]]))
-                }
+                Some(branch) => (s.load(branch.acceleration[0]), s.load(branch.acceleration[1])),
                 None => (zero, zero),
             };
         }
@@ -131,8 +128,7 @@ pub fn outward<L: Lanes>(s: L, of: &mut TreeResponse, system: &System, hinge: &m
             modal_factors[link.flexible as usize].follow(s, body, [angular, linear], &mut modal[system.bodies[k].modal_range()]);
         }
         if let Some(branch) = branches.get_mut(link.branch as usize) {
-            let (a, b) = (s.three(angular), s.three(linear));
-            branch.acceleration = [a[0], a[1], a[2], b[0], b[1], b[2]];
+            branch.acceleration = [s.store(angular), s.store(linear)];
         }
     }
 }
