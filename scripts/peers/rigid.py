@@ -87,7 +87,8 @@ class Times:
 
 
 def time_cases(drivers, folder, cases, rounds, seconds, ops=("fd", "fdf")):
-    """{(model, n): {(driver, op): Times}}: every round asks every program for a case in turn, so that noise falls on all alike."""
+    """{(model, n): {(driver, op): Times}}: every round starts every compiled program anew and asks it for a case in turn, so that noise and the
+    luck of where things lie in memory fall on all alike."""
     log = {}
     for model, n in cases:
         rows = log.setdefault((model, n), {})
@@ -95,6 +96,7 @@ def time_cases(drivers, folder, cases, rounds, seconds, ops=("fd", "fdf")):
             for name, driver in drivers.items():
                 if bodies(model, n) > LARGEST.get(name, sys.maxsize):
                     continue
+                driver.restart()
                 request = _file(folder, model, n) if driver.by_file else model
                 for op in ops:
                     answers = [a for a in (driver.numbers(request, n, same, seconds) for same in SAME[op]) if a is not None]
