@@ -12,11 +12,11 @@ use nalgebra::Vector3;
 /// Records that are together larger than this (bytes) lie in memory rather than in caches.
 const FAR: usize = 8 << 20;
 
-/// How many bodies behind the accelerations the loads are made: of numbers that are there, so that they wait for nothing.
-const BEHIND: usize = 2;
-
 /// How many bodies ahead those are asked for.
 const AHEAD: usize = 8;
+
+/// How many bodies behind the accelerations the loads are made: of numbers that are there, so that they wait for nothing.
+const BEHIND: usize = 2;
 
 /// Fills `hinge` with the accelerations of the hinge rates, and the loads if `LOADS`.
 #[inline(always)]
