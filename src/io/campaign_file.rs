@@ -4,6 +4,7 @@
 //! depends on the time or the machine: the same content makes the same bytes.
 
 use super::results_file::{Preface, parent, write_preface, write_text};
+use super::whole_chunks::whole_chunks;
 use hdf5::types::{FixedUnicode, TypeDescriptor};
 use hdf5::{Dataset, H5Type};
 use ndarray::ArrayViewD;
@@ -98,7 +99,7 @@ impl CampaignFile {
         let partial = partial.map_err(|e| fail(e.to_string()))?.into_temp_path();
         hdf5::silence_errors(true);
         let make = || -> hdf5::Result<(hdf5::File, Vec<_>)> {
-            let file = hdf5::File::with_options().with_fcpl(|p| p.obj_track_times(false)).create(&partial)?;
+            let file = whole_chunks().with_fcpl(|p| p.obj_track_times(false)).create(&partial)?;
             write_preface(&file, preface)?;
             let made = columns.iter().map(|column| Ok((create_column(&file, column, rows)?, column.shape.clone())));
             let made = made.collect::<hdf5::Result<Vec<_>>>()?;

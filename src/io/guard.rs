@@ -6,6 +6,7 @@
 use super::array::{ElementType, GuardedDataset};
 use super::chunks::check_chunks;
 use super::error::ModalFileError;
+use super::whole_chunks::whole_chunks;
 use hdf5::filters::Filter;
 use hdf5::types::{FixedAscii, FixedUnicode, VarLenAscii, VarLenUnicode};
 use hdf5::{Datatype, IndexType, IterationOrder, LinkType, LocationType};
@@ -48,13 +49,22 @@ pub(super) struct GuardedFile {
 impl GuardedFile {
     /// Opens a regular file read-only and lists it.
     pub fn open(path: &Path) -> Result<Self, ModalFileError> {
+        Self::open_by(&hdf5::FileBuilder::new(), path)
+    }
+
+    /// The same for a file that is read by whole chunks.
+    pub fn open_whole_chunks(path: &Path) -> Result<Self, ModalFileError> {
+        Self::open_by(&whole_chunks(), path)
+    }
+
+    fn open_by(builder: &hdf5::FileBuilder, path: &Path) -> Result<Self, ModalFileError> {
         let fail = |cause: String| ModalFileError::Open { file: path.to_owned(), cause };
         let metadata = std::fs::metadata(path).map_err(|e| fail(e.to_string()))?;
         if !metadata.is_file() {
             return Err(fail("not a regular file".to_owned()));
         }
         hdf5::silence_errors(true);
-        let file = hdf5::File::open(path).map_err(|e| fail(cause(&e)))?;
+        let file = builder.open(path).map_err(|e| fail(cause(&e)))?;
         let mut guarded = Self { path: path.to_owned(), file, bytes: metadata.len(), catalogue: BTreeMap::new() };
         guarded.list()?;
         Ok(guarded)

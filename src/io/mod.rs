@@ -35,6 +35,7 @@ pub mod modal_mesh;
 mod modal_writer;
 pub mod results_file;
 pub mod results_reader;
+mod whole_chunks;
 
 pub use campaign_file::{CampaignFile, CampaignFileError};
 pub use error::ModalFileError;

@@ -5,14 +5,21 @@
 
 use super::error::ModalFileError;
 use super::guard::GuardedFile;
+use super::whole_chunks::whole_chunks;
 use hdf5::types::{FixedUnicode, TypeDescriptor};
 use hdf5::{Dataset, Extent, Group, Location, SimpleExtents};
 use ndarray::ArrayView2;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
-/// Rows per chunk, and so of the blocks that cost least.
-pub const BLOCK_ROWS: usize = 64;
+/// Most rows per chunk, and so of the blocks that cost least: the Huffman trees of small chunks cost more than their content.
+pub const BLOCK_ROWS: usize = 256;
+/// Least rows per chunk, however wide a row is.
+const LEAST_BLOCK_ROWS: usize = 64;
+/// A block of more than [`LEAST_BLOCK_ROWS`] stays below this (bytes).
+const BLOCK_BYTES: usize = 4 << 20;
+/// Shuffled doubles of a motion shrink to three quarters at any level; the first costs least.
+const DEFLATE_LEVEL: u8 = 1;
 /// Longest text attribute (bytes).
 const TEXT_LIMIT: usize = 4096;
 
@@ -97,6 +104,7 @@ pub struct ResultsFile {
     series: Vec<(Dataset, Option<usize>)>,
     /// Numbers per output time of all series together.
     row: usize,
+    block_rows: usize,
     /// One series of a block.
     columns: Vec<f64>,
     written: usize,
@@ -115,17 +123,18 @@ impl ResultsFile {
         // the system's own words on a missing folder or a read-only file are clearer than those of libhdf5
         std::fs::OpenOptions::new().write(true).create(true).truncate(false).open(path).map_err(|e| fail(e.to_string()))?;
         hdf5::silence_errors(true);
+        let row = series.iter().map(|s| s.width.unwrap_or(1)).sum::<usize>();
+        let block_rows = (BLOCK_BYTES / (size_of::<f64>() * row.max(1))).clamp(LEAST_BLOCK_ROWS, BLOCK_ROWS);
         let made = || -> hdf5::Result<(hdf5::File, Vec<_>)> {
-            let file = hdf5::File::create(path)?;
+            let file = whole_chunks().create(path)?;
             write_preface(&file, preface)?;
-            let datasets = series.iter().map(|spec| Ok((create_series(&file, spec)?, spec.width)));
+            let datasets = series.iter().map(|spec| Ok((create_series(&file, spec, block_rows)?, spec.width)));
             let datasets = datasets.collect::<hdf5::Result<Vec<_>>>()?;
             file.flush()?;
             Ok((file, datasets))
         };
         let (file, datasets) = made().map_err(|e| fail(e.to_string()))?;
-        let row = series.iter().map(|s| s.width.unwrap_or(1)).sum();
-        Ok(Self { path: path.to_owned(), file, series: datasets, row, columns: Vec::new(), written: 0 })
+        Ok(Self { path: path.to_owned(), file, series: datasets, row, block_rows, columns: Vec::new(), written: 0 })
     }
 
     /// The path as given.
@@ -140,8 +149,14 @@ impl ResultsFile {
         self.written as u64
     }
 
-    /// Appends rows, one after the other, each with the numbers of all series in their order, and brings the file up to date. Blocks of
-    /// [`BLOCK_ROWS`] fill chunks and cost least.
+    /// Rows per chunk, at most [`BLOCK_ROWS`].
+    #[must_use]
+    pub fn block_rows(&self) -> usize {
+        self.block_rows
+    }
+
+    /// Appends rows, one after the other, each with the numbers of all series in their order, and brings the file up to date. Blocks that
+    /// end with a chunk, after a multiple of [`Self::block_rows`], cost least.
     ///
     /// # Errors
     /// If a write fails.
@@ -210,7 +225,7 @@ pub fn read_series(path: &Path, wanted: &[(String, Option<usize>)]) -> Result<Ve
             other => other.to_string(),
         },
     };
-    let file = GuardedFile::open(path).map_err(fail)?;
+    let file = GuardedFile::open_whole_chunks(path).map_err(fail)?;
     let mut rows = None;
     let mut read = |(name, width): &(String, Option<usize>)| {
         let mut shape = vec![rows];
@@ -262,13 +277,13 @@ pub(super) fn parent<'p>(file: &hdf5::File, path: &'p str) -> hdf5::Result<(Grou
     Ok((group, name))
 }
 
-fn create_series(file: &hdf5::File, spec: &SeriesSpec) -> hdf5::Result<Dataset> {
+fn create_series(file: &hdf5::File, spec: &SeriesSpec, rows: usize) -> hdf5::Result<Dataset> {
     let (group, name) = parent(file, &spec.path)?;
     let mut extents = vec![Extent::resizable(0)];
     extents.extend(spec.width.map(Extent::fixed));
-    let chunk: Vec<usize> = std::iter::once(BLOCK_ROWS).chain(spec.width).collect();
+    let chunk: Vec<usize> = std::iter::once(rows).chain(spec.width).collect();
     let builder = group.new_dataset::<f64>().shape(SimpleExtents::from_vec(extents));
-    let dataset = builder.chunk(chunk).shuffle().deflate(4).fletcher32().create(name)?;
+    let dataset = builder.chunk(chunk).shuffle().deflate(DEFLATE_LEVEL).fletcher32().create(name)?;
     spec.attributes.iter().try_for_each(|(name, text)| write_text(&dataset, name, text))?;
     Ok(dataset)
 }

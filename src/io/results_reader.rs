@@ -68,7 +68,7 @@ impl ResultsReader {
     /// # Errors
     /// If it cannot be opened, is no results file, or a series does not have one row per output time.
     pub fn open(path: &Path) -> Result<Self, ResultsError> {
-        let file = GuardedFile::open(path).map_err(|e| failure(path, e))?;
+        let file = GuardedFile::open_whole_chunks(path).map_err(|e| failure(path, e))?;
         Self::list(file).map_err(|e| failure(path, e))
     }
 

@@ -10,13 +10,14 @@ use super::load_pose::{closure_pose, hinge_pose};
 use super::plan::OutputPlan;
 use crate::dynamics::world::WorldFrame;
 use crate::integrate::Sample;
-use crate::io::results_file::{BLOCK_ROWS, Preface, ResultsError, ResultsFile, SeriesSpec, escape};
+use crate::io::results_file::{Preface, ResultsError, ResultsFile, SeriesSpec, escape};
 use crate::model::System;
 use crate::spatial::rotation::quaternion_of_matrix;
 use crossbeam_channel::{Receiver, Sender, bounded};
 use nalgebra::Vector6;
 use std::path::{Path, PathBuf};
 use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
 
 /// Name of the schema.
 pub const FORMAT: &str = "pliant-results";
@@ -26,6 +27,9 @@ pub const VERSION: &str = "1.0";
 /// Memory (bytes) for blocks on their way to the thread; one more is being filled and one being written.
 const ROOM: usize = 32 << 20;
 
+/// How long rows wait for their block at most: what a killed run loses.
+const HOLD: Duration = Duration::from_secs(1);
+
 /// Writes one results file.
 #[derive(Debug)]
 pub struct ResultsWriter {
@@ -34,6 +38,11 @@ pub struct ResultsWriter {
     width: usize,
     /// Rows that are not yet handed over.
     block: Vec<f64>,
+    /// Rows of a whole block.
+    block_rows: usize,
+    /// Rows so far.
+    rows: usize,
+    handed_over: Instant,
     sender: Sender<Vec<f64>>,
     /// Blocks that were written, to be filled again.
     written: Receiver<Vec<f64>>,
@@ -51,7 +60,8 @@ impl ResultsWriter {
         let series: Vec<_> = result_channels(system, plan).iter().map(series_of).collect();
         let width: usize = series.iter().map(|s| s.width.unwrap_or(1)).sum();
         let mut file = ResultsFile::create(path, &preface(plan), &series)?;
-        let in_flight = ROOM / (size_of::<f64>() * width.max(1) * BLOCK_ROWS);
+        let block_rows = file.block_rows();
+        let in_flight = ROOM / (size_of::<f64>() * width.max(1) * block_rows);
         let (sender, receiver) = bounded::<Vec<f64>>(in_flight);
         let (returned, written) = bounded(in_flight + 1);
         let work = move || {
@@ -65,7 +75,9 @@ impl ResultsWriter {
         };
         let thread = std::thread::Builder::new().name("results".into()).spawn(work);
         let thread = thread.map_err(|e| ResultsError::Create { file: path.to_owned(), cause: e.to_string() })?;
-        Ok(Self { path: path.to_owned(), width, block: Vec::new(), sender, written, thread, quaternions: Vec::new() })
+        let block = Vec::with_capacity(width * block_rows);
+        let (path, handed_over, quaternions) = (path.to_owned(), Instant::now(), Vec::new());
+        Ok(Self { path, width, block, block_rows, rows: 0, handed_over, sender, written, thread, quaternions })
     }
 
     /// The path as given.
@@ -130,13 +142,22 @@ impl ResultsWriter {
         row.extend(frame.audit.map(|audit| audit.load));
         debug_assert_eq!(row.len() - start, self.width, "a row has one number per column");
         row.resize(start + self.width, f64::NAN);
-        if row.len() < self.width * BLOCK_ROWS {
-            return true;
-        }
-        let next = self.written.try_recv().unwrap_or_else(|_| Vec::with_capacity(self.width * BLOCK_ROWS));
-        let full = std::mem::replace(&mut self.block, next);
+        self.rows += 1;
+        !self.rows.is_multiple_of(self.block_rows) || self.hand_over(Instant::now())
+    }
+
+    /// Hands over rows that have waited long enough for their block; to be called often. False as [`Self::write`].
+    #[must_use]
+    pub fn pass_on(&mut self, now: Instant) -> bool {
+        self.block.is_empty() || now.duration_since(self.handed_over) < HOLD || self.hand_over(now)
+    }
+
+    fn hand_over(&mut self, now: Instant) -> bool {
+        self.handed_over = now;
+        let next = self.written.try_recv().unwrap_or_else(|_| Vec::with_capacity(self.width * self.block_rows));
+        let block = std::mem::replace(&mut self.block, next);
         self.block.clear();
-        self.sender.send(full).is_ok()
+        self.sender.send(block).is_ok()
     }
 
     /// Waits until all rows are in the file and writes how the run ended; returns the number of rows.

@@ -1,8 +1,10 @@
 """A results file is read by h5py in three lines and plotted by the script; its loads are those of the closing report."""
 import json
 import pathlib
+import re
 import subprocess
 import sys
+import time
 
 import h5py
 import numpy as np
@@ -82,3 +84,31 @@ def test_loads_at_closures_are_read_and_drawn(tmp_path):
     assert picture.read_bytes().startswith(b"\x89PNG") and picture.stat().st_size > 20_000
     done = subprocess.run([*draw, "--closure", "pin"], capture_output=True, text=True)
     assert done.returncode != 0 and "no loads of closure pin in the file; it has rocker_pin" in done.stderr
+
+
+def largest_memory(*arguments):
+    """Largest resident memory (MB) of a command, from its process while it lives."""
+    largest = 0
+    with subprocess.Popen([PROGRAM, *arguments], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as process:
+        while process.poll() is None:
+            status = re.search(r"VmHWM:\s*(\d+) kB", pathlib.Path(f"/proc/{process.pid}/status").read_text())
+            largest = max(largest, int(status[1]) / 1e3 if status else 0)
+            time.sleep(0.01)
+        assert process.returncode == 0, process.stderr.read()
+    return largest
+
+
+@pytest.mark.skipif(not pathlib.Path("/proc/self/status").exists(), reason="memory is read from /proc")
+def test_memory_does_not_grow_with_the_run(run, tmp_path):
+    """Ten times the output times, 44 MB more in the file: a run may add its room for blocks on their way, 32 MB, and a little for their use; an export
+    reads block by block and adds nothing but the list of chunks."""
+    text = SCENE.read_text().replace("../../modes", str(ROOT / "modes"))
+    used = []
+    for duration in (2, 20):
+        scene, results = tmp_path / f"scene_{duration}.toml", tmp_path / f"run_{duration}.h5"
+        scene.write_text(re.sub(r"^duration = .*$", f"duration = {duration}.0", re.sub(r"^rate_hz = .*$", "rate_hz = 2000.0", text, flags=re.M), flags=re.M))
+        written = largest_memory("run", scene, "--viewer", "none", "--out", results)
+        used.append((written, largest_memory("export", results, "--format", "csv", "--out", tmp_path / "run.csv")))
+    with h5py.File(results) as file:
+        assert len(file["time"]) == 40_001
+    assert used[1][0] - used[0][0] < 40 and used[1][1] - used[0][1] < 8, used
