@@ -2,7 +2,9 @@
 """What streaming and results cost: runs of the default example at 60 output times per second, bare and with each output, in turn.
 
 Two ratios to the bare run of the same round: of the run itself, as the report has it, and of the whole process from start to exit, which
-waits until everything is on disk. Median, least and largest over the rounds. Writes nothing but its own scratch folder.
+waits until everything is on disk. Median over the rounds with its standard error (from the median deviation, as for a normal scatter), least
+and largest. Every other round goes through the variants backwards, so that a machine that gets slower favours none. Writes nothing but its own
+scratch folder.
 """
 import argparse
 import json
@@ -49,26 +51,33 @@ def run(program, path, arguments):
     return report["wall_s"], whole, after.children_user + after.children_system - before.children_user - before.children_system
 
 
+def summary(extra):
+    """Median of percentages with its standard error, and their range."""
+    median = statistics.median(extra)
+    deviation = 1.4826 * statistics.median(abs(x - median) for x in extra)
+    return f"{median:+.1f} ± {1.2533 * deviation / len(extra) ** 0.5:.1f} % ({min(extra):+.1f} to {max(extra):+.1f})"
+
+
 def main():
     """The command."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--rounds", type=int, default=15)
+    parser.add_argument("--rounds", type=int, default=40)
     parser.add_argument("--duration", type=int, help="simulated time (s); default that of the example")
     parser.add_argument("--program", type=Path, default=ROOT / "target" / "release" / "pliant", help="default target/release/pliant")
     options = parser.parse_args()
     log = {name: [] for name in VARIANTS}
     with tempfile.TemporaryDirectory() as scratch:
         path = scene(Path(scratch), options.duration)
-        for _ in range(options.rounds):
-            for name, arguments in VARIANTS.items():
-                log[name].append(run(options.program, path, arguments))
+        for number in range(options.rounds):
+            for name in list(VARIANTS)[:: -1 if number % 2 else 1]:
+                log[name].append(run(options.program, path, VARIANTS[name]))
     medians = [statistics.median(values) for values in zip(*log["bare"])]
     print("bare: {:.4f} s of run, {:.4f} s of process, {:.4f} s of CPU time".format(*medians))
     for name in list(VARIANTS)[1:]:
         words = []
         for part, what in enumerate(("run", "process", "CPU time")):
             extra = [100 * (with_output[part] / bare[part] - 1) for with_output, bare in zip(log[name], log["bare"])]
-            words.append(f"{what} {statistics.median(extra):+.1f} % ({min(extra):+.1f} to {max(extra):+.1f})")
+            words.append(f"{what} {summary(extra)}")
         print(f"{name}: {'; '.join(words)}")
 
 
