@@ -214,6 +214,53 @@ fn overrides_change_the_scene_and_faulty_ones_are_refused() {
     assert!(text(&wrong.stderr).contains("--integrator: \"euler\""), "{}", text(&wrong.stderr));
 }
 
+/// One scene serves a comparison: a stress monitor does not stand in the way of a body that is to be rigid.
+#[test]
+fn stress_of_a_body_without_modes_is_left_out_and_said() {
+    let example = root().join("examples/02_hub_two_panels/scene.toml");
+    let run = |more: &[&str]| {
+        let done = pliant(&[&["run", example.to_str().unwrap(), "--viewer", "none", "--duration", "0.1", "--json"], more].concat());
+        assert_eq!(done.status.code(), Some(0), "{}", text(&done.stderr));
+        let report: Value = serde_json::from_slice(&done.stdout).unwrap();
+        let bodies: Vec<_> = report["peaks"]["bodies"].as_object().unwrap().keys().cloned().collect();
+        (bodies, report["left_out"].as_array().unwrap().iter().map(|line| line.as_str().unwrap().to_owned()).collect::<Vec<_>>())
+    };
+    let (bodies, left_out) = run(&["--rigid", "panel_left"]);
+    assert_eq!(bodies, ["panel_right"]);
+    assert!(left_out.iter().any(|line| line == "stress of \"panel_left\", which retains no mode"), "{left_out:?}");
+    let (bodies, left_out) = run(&["--modes", "0"]);
+    assert!(bodies.is_empty() && left_out.iter().any(|line| line.contains("stress of \"panel_left\"")), "{bodies:?} {left_out:?}");
+}
+
+#[test]
+fn stress_that_the_modal_file_lacks_is_left_out_or_refused_where_it_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.toml");
+    let sound = scene(folder.path()).replace("count = 4", "count = 3");
+    std::fs::copy(root().join("tests/data/cantilever.h5"), folder.path().join("boom.h5")).unwrap();
+    let command = |command: &[&str], more: &str| {
+        std::fs::write(&path, sound.replace("[simulation]", &format!("{more}\n[simulation]"))).unwrap();
+        pliant(&[command, &[path.to_str().unwrap()]].concat())
+    };
+    let done = command(&["run", "--viewer", "none"], "");
+    assert_eq!(done.status.code(), Some(0), "{}", text(&done.stderr));
+    assert!(text(&done.stdout).contains("stress of \"boom\", whose modal file has no stress modes"), "{}", text(&done.stdout));
+    for (more, key) in
+        [("[[monitor]]\nbody = \"boom\"\nstress_limit = 1e6", "monitor[1].body"), ("[output]\nstress = [\"boom\"]", "output.stress[1]")]
+    {
+        // what a run refuses, a check refuses too
+        for refused in [command(&["check"], more), command(&["run", "--viewer", "none"], more)] {
+            assert_eq!(refused.status.code(), Some(2));
+            let message = text(&refused.stderr);
+            for part in ["scene.toml:", key, "the modal file of \"boom\" has no stress modes", "modes/stress", "drop"] {
+                assert!(message.contains(part), "no \"{part}\" in: {message}");
+            }
+        }
+    }
+    let rigid = command(&["check"], "[output]\nstress = [\"bob\"]");
+    assert!(text(&rigid.stderr).contains("\"bob\" is not a flexible body of the scene"), "{}", text(&rigid.stderr));
+}
+
 #[test]
 fn loops_run_by_every_method_and_integrator_and_the_report_says_which() {
     let example = root().join("examples/06_four_bar/scene.toml");

@@ -2,9 +2,8 @@
 
 use super::plan::{BodyBox, BodySurface, ModalFileRecord, OutputPlan, TruncationPlan};
 use crate::io::ModalFileError;
-use crate::model::Surface;
-use crate::model::{BodyKind, ModeBasis};
-use crate::scene::Scene;
+use crate::model::{BodyKind, ModeBasis, Surface, System};
+use crate::scene::{Monitor, Scene};
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -24,8 +23,7 @@ pub fn plan(scene: &Scene, picture: bool) -> Result<OutputPlan, ModalFileError> 
             content_sha256: selection.content_sha256.clone(),
             residual_modes: selection.basis.has_residual().then(|| selection.basis.residual.clone()),
         });
-        let has_stress = selection.file.stress_location()?.is_some();
-        let stress = has_stress && selection.basis.mode_count() > 0 && (scene.stress.contains(body) || scene.monitors_stress(*body));
+        let stress = selection.basis.mode_count() > 0 && (scene.stress.contains(body) || scene.monitors_stress(*body));
         if picture || stress {
             let key = Arc::as_ptr(&selection.basis);
             let surface = match shared.get(&key) {
@@ -62,11 +60,16 @@ pub fn plan(scene: &Scene, picture: bool) -> Result<OutputPlan, ModalFileError> 
         closures: scene.closures.clone(),
         surfaces,
         boxes: scene.boxes.iter().enumerate().filter_map(box_of).collect(),
-        monitors: scene.monitors.clone(),
+        monitors: scene.monitors.iter().filter(|m| is_there(m, &scene.system)).copied().collect(),
         deformation_scale: scene.deformation_scale,
         audit: scene.audit,
         truncation,
     })
+}
+
+/// False for the stress of a body that retains no mode.
+fn is_there(monitor: &Monitor, system: &System) -> bool {
+    !matches!(*monitor, Monitor::Body { body, .. } if system.bodies[body].mode_count() == 0)
 }
 
 /// The modes that `scene` leaves out, with their stress where that of their body is evaluated.

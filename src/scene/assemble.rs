@@ -1,13 +1,13 @@
 //! A scene file to a [`Scene`]: the system, its initial state, and what a run of it shall do.
 
-use super::closures::{closure_index, gear_unit};
 use super::error::{SceneError, Source};
 use super::functions::function;
 use super::locate::{Step, first_not_finite};
 #[cfg(feature = "hdf5")]
 use super::modal_files::ModalFiles;
+use super::outputs::{Monitor, Outputs, describe_left_out};
 use super::settings;
-use super::spec::{BodySpec, FunctionSpec, HingeSpec, LoadSpec, MonitorSpec, Numbers, SceneSpec};
+use super::spec::{BodySpec, FunctionSpec, HingeSpec, LoadSpec, Numbers, SceneSpec};
 use crate::dynamics::closed_chain::assembly;
 use crate::integrate::simulate::Method;
 use crate::model::build::{BodyDefinition, BodyDefinitionKind, Definition, Frame, HingeDefinition, LoadDefinition, PointDefinition};
@@ -38,36 +38,6 @@ pub struct Overrides {
     pub inertia_order: Option<u8>,
 }
 
-/// Limits to watch: of loads at every step and output time, of stress at every output time.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Monitor {
-    /// Magnitudes of the load at the inboard hinge of a body.
-    Hinge {
-        /// Index of the body that the hinge carries.
-        body: usize,
-        /// N m.
-        moment_limit: Option<f64>,
-        /// N.
-        force_limit: Option<f64>,
-    },
-    /// Magnitudes of the load of a closure; what a gear exerts on an angle counts as a moment, on a travel as a force.
-    Closure {
-        /// Index of the closure.
-        closure: usize,
-        /// N m.
-        moment_limit: Option<f64>,
-        /// N.
-        force_limit: Option<f64>,
-    },
-    /// Von Mises stress of a flexible body.
-    Body {
-        /// Index of the body.
-        body: usize,
-        /// Pa.
-        stress_limit: Option<f64>,
-    },
-}
-
 /// A scene ready to run.
 #[derive(Debug)]
 pub struct Scene {
@@ -93,9 +63,9 @@ pub struct Scene {
     pub hinges: Vec<usize>,
     /// Closures whose loads are output.
     pub closures: Vec<usize>,
-    /// Bodies whose stress is evaluated.
+    /// Bodies whose stress is evaluated if they retain a mode; monitors name others.
     pub stress: Vec<usize>,
-    /// True if the scene names these; else they are all flexible bodies.
+    /// True if the scene names these; else they are all that have stress modes.
     pub stress_named: bool,
     /// Whether output times are audited.
     pub audit: bool,
@@ -225,12 +195,12 @@ type Files = ModalFiles;
 /// No modal files without the feature.
 #[cfg(not(feature = "hdf5"))]
 #[derive(Default)]
-struct Files;
+struct Files {}
 
 /// As [`assemble`], with the modal files `files` already read.
 fn assemble_spec(source: Source, spec: SceneSpec, overrides: &Overrides, files: Files) -> Result<Scene, SceneError> {
     #[cfg(not(feature = "hdf5"))]
-    let Files = files;
+    let Files {} = files;
     check_overrides(&spec, overrides)?;
     let mut assembly = Assembly {
         source: &source,
@@ -245,7 +215,6 @@ fn assemble_spec(source: Source, spec: SceneSpec, overrides: &Overrides, files: 
     let (system, mut state) = definition.build().map_err(|e| source.model(&e))?;
     assembly::assemble(&system, &mut state)
         .map_err(|e| source.value(&[Step::Key("closure"), Step::Index(e.closure), Step::Key("name")], e.to_string()))?;
-    let mut left_out = std::mem::take(&mut assembly.left_out);
 
     if !(spec.output.rate_hz > 0.0) {
         return Err(source.value(&[Step::Key("output"), Step::Key("rate_hz")], format!("{} must be positive", spec.output.rate_hz)));
@@ -257,26 +226,12 @@ fn assemble_spec(source: Source, spec: SceneSpec, overrides: &Overrides, files: 
     let control = settings::control(&spec.simulation, &source)?;
     let (method, method_reason) =
         settings::method(&spec.simulation, &control, overrides.integrator.as_deref(), &system, spec.output.rate_hz, &source)?;
-    let hinges = match &spec.output.hinges {
-        None => system.definition_order.clone(),
-        Some(names) => names_to_indices(names, "hinges", "hinge", |n| system.hinge_index(n), &source)?,
-    };
-    let closures = match &spec.output.closures {
-        None => (0..system.closures.len()).collect(),
-        Some(names) => names_to_indices(names, "closures", "closure", |n| closure_index(&system, n), &source)?,
-    };
-    let stress = match &spec.output.stress {
-        None => system.definition_order.iter().copied().filter(|&k| system.bodies[k].mode_count() > 0).collect(),
-        Some(names) => names_to_indices(names, "stress", "body", |n| system.body_index(n), &source)?,
-    };
-    for &k in stress.iter().filter(|&&k| spec.output.stress.is_some() && system.bodies[k].mode_count() == 0) {
-        left_out.push(format!("stress of \"{}\", which has no modes", system.bodies[k].name));
-    }
-    let monitors = spec.monitor.iter().enumerate().map(|(i, m)| monitor(i, m, &system, &source)).collect::<Result<_, _>>()?;
+    let Outputs { hinges, closures, stress, monitors } = assembly.outputs(&spec, &system)?;
     let mut boxes = vec![None; system.bodies.len()];
     for (body, &k) in spec.body.iter().zip(&system.definition_order) {
         boxes[k] = body.box_size;
     }
+    let mut left_out = std::mem::take(&mut assembly.left_out);
     describe_left_out(&spec, &system, [hinges.len(), closures.len()], &mut left_out);
     #[cfg(feature = "hdf5")]
     if !spec.output.truncation && assembly.chosen.iter().any(|(_, selection)| !selection.basis.is_complete()) {
@@ -348,88 +303,6 @@ fn check_overrides(spec: &SceneSpec, overrides: &Overrides) -> Result<(), SceneE
                 if flexible.is_empty() { "none".into() } else { flexible.join(", ") }
             ),
         }),
-    }
-}
-
-fn names_to_indices(
-    names: &[String],
-    key: &'static str,
-    what: &str,
-    find: impl Fn(&str) -> Option<usize>,
-    source: &Source,
-) -> Result<Vec<usize>, SceneError> {
-    let steps = |i| [Step::Key("output"), Step::Key(key), Step::Index(i)];
-    let index = |(i, name): (usize, &String)| {
-        if names[..i].contains(name) {
-            return Err(source.value(&steps(i), format!("\"{name}\" is named twice; name it once")));
-        }
-        find(name).ok_or_else(|| source.value(&steps(i), format!("\"{name}\" is not a {what} of the scene")))
-    };
-    names.iter().enumerate().map(index).collect()
-}
-
-fn monitor(index: usize, spec: &MonitorSpec, system: &System, source: &Source) -> Result<Monitor, SceneError> {
-    let at = |key| [Step::Key("monitor"), Step::Index(index), Step::Key(key)];
-    for (key, limit) in [("moment_limit", spec.moment_limit), ("force_limit", spec.force_limit), ("stress_limit", spec.stress_limit)] {
-        if let Some(limit) = limit.filter(|l| !(*l > 0.0)) {
-            return Err(source.value(&at(key), format!("{limit} must be positive; it is a limit on a magnitude")));
-        }
-    }
-    let MonitorSpec { moment_limit, force_limit, stress_limit, .. } = *spec;
-    match (&spec.hinge, &spec.closure, &spec.body) {
-        (Some(name), None, None) if stress_limit.is_none() => {
-            let body =
-                system.hinge_index(name).ok_or_else(|| source.value(&at("hinge"), format!("\"{name}\" is not a hinge of the scene")))?;
-            Ok(Monitor::Hinge { body, moment_limit, force_limit })
-        }
-        (None, Some(name), None) if stress_limit.is_none() => {
-            let closure = closure_index(system, name);
-            let closure = closure.ok_or_else(|| source.value(&at("closure"), format!("\"{name}\" is not a closure of the scene")))?;
-            let refused = |key, unit, instead| {
-                let message =
-                    format!("closure \"{name}\" is a gear, and what it exerts on coordinate b is in {unit}; give {instead} instead");
-                Err(source.value(&at(key), message))
-            };
-            match gear_unit(system, &system.closures[closure]) {
-                Some(unit @ "N m") if force_limit.is_some() => refused("force_limit", unit, "moment_limit"),
-                Some(unit @ "N") if moment_limit.is_some() => refused("moment_limit", unit, "force_limit"),
-                _ => Ok(Monitor::Closure { closure, moment_limit, force_limit }),
-            }
-        }
-        (None, None, Some(name)) if moment_limit.is_none() && force_limit.is_none() => {
-            let body = system.body_index(name).filter(|&k| system.bodies[k].flexible().is_some());
-            let body = body.ok_or_else(|| source.value(&at("body"), format!("\"{name}\" is not a flexible body of the scene")))?;
-            Ok(Monitor::Body { body, stress_limit })
-        }
-        _ => Err(source.value(
-            &[Step::Key("monitor"), Step::Index(index)],
-            "a monitor watches one of hinge = NAME or closure = NAME with moment_limit, force_limit, or body = NAME with stress_limit",
-        )),
-    }
-}
-
-/// `loaded` are the numbers of hinges and closures whose loads are output.
-fn describe_left_out(spec: &SceneSpec, system: &System, loaded: [usize; 2], left_out: &mut Vec<String>) {
-    if system.modal_count == 0 {
-        left_out.push("modes (no flexible body)".into());
-    }
-    if spec.gravity == [0.0; 3] {
-        left_out.push("gravity".into());
-    }
-    if system.loads.is_empty() {
-        left_out.push("external loads".into());
-    }
-    let all = [(system.bodies.len(), "hinges"), (system.closures.len(), "closures")];
-    for ((count, what), loaded) in all.into_iter().zip(loaded) {
-        if loaded < count {
-            left_out.push(format!("loads at {} of {count} {what}", count - loaded));
-        }
-    }
-    if !spec.output.audit {
-        left_out.push("load audit".into());
-    }
-    if system.closures.is_empty() {
-        left_out.push("closures".into());
     }
 }
 

@@ -11,11 +11,13 @@ pub mod key_path;
 pub mod locate;
 #[cfg(feature = "hdf5")]
 pub mod modal_files;
+mod outputs;
 pub mod settings;
 pub mod spec;
 
-pub use assemble::{Monitor, Overrides, Scene};
+pub use assemble::{Overrides, Scene};
 pub use error::SceneError;
 pub use import_spec::ImportSpec;
 pub use key_path::{KeyFault, KeyPath};
+pub use outputs::Monitor;
 pub use settings::Accuracy;

@@ -12,7 +12,6 @@ use crate::io::ModalFileError;
 #[cfg(feature = "hdf5")]
 use crate::model::ModeBasis;
 use crate::model::Surface;
-use crate::output::PlanError;
 use crate::scene::Scene;
 use std::sync::Arc;
 use thiserror::Error;
@@ -20,9 +19,6 @@ use thiserror::Error;
 /// Why the stress of a scene cannot be compared.
 #[derive(Debug, Error)]
 pub enum StressError {
-    /// A monitored body without stress modes.
-    #[error(transparent)]
-    Plan(#[from] PlanError),
     /// A modal file that cannot be read.
     #[cfg(feature = "hdf5")]
     #[error(transparent)]
@@ -60,18 +56,14 @@ impl StressGauges {
     /// The gauges of the bodies whose stress `scene` asks for by name, in the order in which it defines them.
     ///
     /// # Errors
-    /// If a monitored body has no stress modes, or a modal file cannot be read.
+    /// If a modal file cannot be read.
     #[cfg(feature = "hdf5")]
     pub fn of(&mut self, scene: &Scene) -> Result<Vec<StressGauge>, StressError> {
         let mut gauges = Vec::new();
         for body in scene.asked_stress() {
             let Some((_, selection)) = scene.flexible.iter().find(|(k, _)| *k == body) else { continue };
+            // a scene refuses such a file, unless the body was told to retain no mode
             if selection.file.stress_location()?.is_none() {
-                // a run evaluates no stress there either if only output.stress names it
-                if scene.monitors_stress(body) {
-                    let reason = "its modal file has no stress modes";
-                    return Err(PlanError::NoStress { body: scene.system.bodies[body].name.clone(), reason }.into());
-                }
                 continue;
             }
             let (digest, basis) = (&selection.content_sha256, &selection.basis);
