@@ -110,6 +110,7 @@ fn faults_of_a_scene_are_named_with_line_key_and_remedy_and_exit_2() {
         ("[simulation]", "[[monitor]]\nhinge = \"pn\"\n[simulation]", &["monitor[1].hinge", "\"pn\" is not a hinge"]),
         ("[simulation]", "[[load]]\nbody = \"bob\"\n[simulation]", &["load[1]", "force, moment or both"]),
         ("[simulation]", "[simulation", &["line 30", "TOML parse error"]),
+        ("name = \"pendulum on a boom\"", "seed = 2026", &["unknown field `seed`", "plan of a campaign", "pliant sweep SCENE.toml"]),
     ];
     for (from, to, expected) in cases {
         let done = with_change("check", from, to);

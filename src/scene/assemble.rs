@@ -187,7 +187,13 @@ pub fn assemble_document(source: Source, document: toml::Table, overrides: &Over
 }
 
 fn syntax(source: &Source, error: &toml::de::Error) -> SceneError {
-    SceneError::Syntax { path: source.path.clone(), message: error.to_string().trim_end().to_owned() }
+    let mut message = error.to_string().trim_end().to_owned();
+    // what only the plan of a campaign has
+    if ["parameter", "samples", "seed"].iter().any(|key| message.contains(&format!("unknown field `{key}`"))) {
+        message +=
+            &format!("\nthis looks like the plan of a campaign; run it with its scene: pliant sweep SCENE.toml {}", source.path.display());
+    }
+    SceneError::Syntax { path: source.path.clone(), message }
 }
 
 #[cfg(feature = "hdf5")]
