@@ -11,7 +11,7 @@ use pliant::io::{ModalFile, ResultsFile};
 use pliant::model::build::{BodyDefinition, BodyDefinitionKind, Definition, FlexibleDefinition, Frame, HingeDefinition, WORLD};
 use pliant::model::flexible_body::ModalIntegrals;
 use pliant::model::{InertiaOrder, State, System, TimeFunction};
-use pliant::output::viewer::probe;
+use pliant::output::viewer_program::probe;
 use pliant::output::{BodyBox, BodySurface, ModalFileRecord, Monitor, OutputPlan, OutputSet, RunReport, ViewerError, ViewerTarget};
 use rerun::external::re_log_types::LogMsg;
 use std::collections::BTreeMap;

@@ -5,6 +5,7 @@
 pub mod aggregate;
 pub mod build;
 pub mod build_closure;
+mod build_hinge;
 pub mod closure;
 pub mod definition;
 pub mod error;

@@ -28,6 +28,7 @@ pub mod surface;
 pub mod tracker;
 pub mod truncation;
 pub mod viewer;
+pub mod viewer_program;
 
 pub use evaluation::Evaluation;
 pub use plan::{BodyBox, BodySurface, ModalFileRecord, Monitor, OutputPlan, PlanError};
