@@ -20,6 +20,8 @@ pub struct Chart<'a> {
     pub base: State,
     /// What rounding has left out of `base.time` (s): the step starts at the sum of the two.
     pub clock_rest: f64,
+    /// The next time (s) at which a function may jump: no stage is evaluated beyond it, where rounding of t + h would.
+    pub stop: f64,
     /// Work done up to the step's start (J).
     pub work: f64,
     /// Evaluations so far.
@@ -45,6 +47,7 @@ impl<'a> Chart<'a> {
             system,
             base: start.clone(),
             clock_rest: 0.0,
+            stop: f64::INFINITY,
             work: 0.0,
             evaluations: 0,
             timed: (Duration::ZERO, 0),
@@ -108,6 +111,7 @@ impl<'a> Chart<'a> {
     /// # Errors
     /// If the dynamics have no answer there.
     pub fn rate(&mut self, time: f64, y: &[f64], rate: &mut [f64]) -> Result<(), DynamicsError> {
+        let time = time.min(self.stop);
         let mut state = std::mem::replace(
             &mut self.state,
             State { time, position: vec![], velocity: vec![], modal_position: vec![], modal_velocity: vec![] },

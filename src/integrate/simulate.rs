@@ -119,6 +119,7 @@ pub fn simulate(system: &System, start: &State, settings: &Settings, observers: 
         accepted: step,
         crept: 0,
         largest,
+        resolution: f64::INFINITY,
         relative: tolerance.map_or(0.0, |t| t.relative),
         output: Workspace::new(system),
         sampled: start.clone(),
@@ -194,6 +195,8 @@ struct Run<'r, 's> {
     /// Very short steps in a row.
     crept: u32,
     largest: f64,
+    /// Longest step that sees the course of all functions up to the next break.
+    resolution: f64,
     relative: f64,
     output: Workspace,
     sampled: State,
@@ -209,15 +212,19 @@ impl Run<'_, '_> {
         let (start, end) = (self.outputs.start, self.outputs.end);
         let mut stops: Vec<f64> = self.chart.system.breaks().into_iter().filter(|&t| t > start && t < end).collect();
         stops.push(end);
-        if let Err(source) = stepper.restart(self.chart) {
-            return Outcome::Failed(RunFailure::Dynamics { time: start, source });
-        }
         match self.emit(stepper, 0.0, observers) {
             Ok(Flow::Continue) => {}
             Ok(Flow::Stop) => return Outcome::Stopped,
             Err(failure) => return Outcome::Failed(failure),
         }
         for stop in stops {
+            self.chart.stop = stop;
+            self.resolution = self.chart.system.resolution(0.5 * (self.chart.base.time + stop));
+            match self.begin_anew(stepper, observers) {
+                Ok(Flow::Continue) => {}
+                Ok(Flow::Stop) => return Outcome::Stopped,
+                Err(failure) => return Outcome::Failed(failure),
+            }
             while self.chart.base.time < stop {
                 let done = self.advance(stepper, stop).and_then(|taken| {
                     self.steps += 1;
@@ -235,11 +242,7 @@ impl Run<'_, '_> {
                     if !self.chart.system.closures.is_empty() {
                         self.hold_closures(stepper)?;
                     }
-                    let chart = &*self.chart;
-                    let (state, workspace) = (&chart.base, &chart.workspace);
-                    let step = Sample { system: chart.system, state, workspace, work: chart.work, steps: self.steps };
-                    let asked = observers.iter_mut().fold(Flow::Continue, |f, o| if o.step(&step) == Flow::Stop { Flow::Stop } else { f });
-                    if asked == Flow::Stop { Ok(Flow::Stop) } else { flow }
+                    if self.show_step(observers) == Flow::Stop { Ok(Flow::Stop) } else { flow }
                 });
                 match done {
                     Ok(Flow::Continue) => {}
@@ -247,14 +250,24 @@ impl Run<'_, '_> {
                     Err(failure) => return Outcome::Failed(failure),
                 }
             }
-            // a function may have jumped here
-            if stop < end
-                && let Err(source) = stepper.restart(self.chart)
-            {
-                return Outcome::Failed(RunFailure::Dynamics { time: stop, source });
-            }
         }
         Outcome::Completed
+    }
+
+    /// Starts from the base with the functions' values from just after it, as some may have jumped, and shows what they do there.
+    fn begin_anew(&mut self, stepper: &mut dyn Stepper, observers: &mut [&mut dyn Observer]) -> Result<Flow, RunFailure> {
+        let time = self.chart.base.time;
+        self.chart.base.time = time.next_up();
+        let restarted = stepper.restart(self.chart);
+        self.chart.base.time = time;
+        restarted.map_err(|source| RunFailure::Dynamics { time, source })?;
+        Ok(self.show_step(observers))
+    }
+
+    fn show_step(&self, observers: &mut [&mut dyn Observer]) -> Flow {
+        let chart = &*self.chart;
+        let step = Sample { system: chart.system, state: &chart.base, workspace: &chart.workspace, work: chart.work, steps: self.steps };
+        observers.iter_mut().fold(Flow::Continue, |flow, o| if o.step(&step) == Flow::Stop { Flow::Stop } else { flow })
     }
 
     /// Carries the local error of the attempted step to what the observers look at. A solution without an evaluation says nothing.
@@ -312,13 +325,15 @@ impl Run<'_, '_> {
         loop {
             let time = self.chart.base.time;
             let left = (stop - time) - self.chart.clock_rest;
+            // an error that is small because little moves must not let a step pass over a torque or a prescribed motion
+            let planned = if self.controller.is_some() { self.step.min(self.resolution) } else { self.step };
             // what is left is taken at once, or halved rather than leave a sliver
-            let step = if left <= self.step * (1.0 + 1e-9) {
+            let step = if left <= planned * (1.0 + 1e-9) {
                 left
-            } else if left < 2.0 * self.step && self.controller.is_some() {
+            } else if left < 2.0 * planned && self.controller.is_some() {
                 0.5 * left
             } else {
-                self.step
+                planned
             };
             let floor = 16.0 * f64::EPSILON * time.abs().max(stop.abs());
             if step < floor && step < left {

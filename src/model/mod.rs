@@ -182,12 +182,22 @@ impl System {
     #[must_use]
     pub fn breaks(&self) -> Vec<f64> {
         let mut times = Vec::new();
-        let hinges = self.bodies.iter().flat_map(|b| [&b.hinge.torque, &b.hinge.motion]);
-        let loads = self.loads.iter().flat_map(|l| [&l.force, &l.moment]);
-        hinges.chain(loads).flatten().for_each(|f| f.breaks(&mut times));
+        self.functions().for_each(|f| f.breaks(&mut times));
         times.sort_by(f64::total_cmp);
         times.dedup();
         times
+    }
+
+    /// Longest step (s) around time `t` that sees the course of every function, between two breaks.
+    #[must_use]
+    pub fn resolution(&self, t: f64) -> f64 {
+        self.functions().map(|f| f.resolution(t)).fold(f64::INFINITY, f64::min)
+    }
+
+    fn functions(&self) -> impl Iterator<Item = &TimeFunction> {
+        let hinges = self.bodies.iter().flat_map(|b| [&b.hinge.torque, &b.hinge.motion]);
+        let loads = self.loads.iter().flat_map(|l| [&l.force, &l.moment]);
+        hinges.chain(loads).flatten()
     }
 
     /// Largest number of modes of one body.
