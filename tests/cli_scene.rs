@@ -13,6 +13,10 @@ fn pliant(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_pliant")).args(arguments).stdin(Stdio::null()).output().unwrap()
 }
 
+fn text_of(done: &Output) -> String {
+    text(&done.stdout) + &text(&done.stderr)
+}
+
 fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
 }
@@ -215,6 +219,100 @@ fn overrides_change_the_scene_and_faulty_ones_are_refused() {
     assert!(text(&wrong.stderr).contains("--integrator: \"euler\""), "{}", text(&wrong.stderr));
 }
 
+/// Where every hinge is prescribed nothing that is integrated limits the steps: they must see the motion all the same.
+#[test]
+fn a_prescribed_slew_between_two_output_times_is_not_passed_over() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.toml");
+    let run = |motion: &str, more: &[&str]| -> Value {
+        let text = format!(
+            "[[body]]\nname = \"dish\"\nmass = 1.0\ninertia = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]\n[[hinge]]\nname = \"drive\"\n\
+             kind = \"revolute\"\naxis = [0.0, 0.0, 1.0]\nparent = \"world\"\nchild = \"dish\"\nmotion = {motion}\n[[monitor]]\nhinge = \"drive\"\n\
+             moment_limit = 1.5\n[simulation]\nduration = 40.0\n[output]\nrate_hz = 1.0\n"
+        );
+        std::fs::write(&path, text).unwrap();
+        let done = pliant(&[&["run", path.to_str().unwrap(), "--viewer", "none", "--json"], more].concat());
+        assert_eq!(done.status.code(), Some(0), "{}", text_of(&done));
+        serde_json::from_slice(&done.stdout).unwrap()
+    };
+    let peak = |report: &Value| report["peaks"]["hinges"]["drive"]["moment"].as_f64().unwrap();
+    for integrator in ["dormand_prince", "rosenbrock_w"] {
+        // 10 / sqrt(3) of d / T^2, and what half a step of T / 38 misses of it: (1 / 76)^2 / 2 of a curvature of 36 peaks
+        let slew = run("{ smooth_step = { from = 0.0, to = 1.0, start = 1.0, end = 1.5 } }", &["--integrator", integrator]);
+        let exact = 10.0 / 3.0_f64.sqrt() / 0.25;
+        assert!(peak(&slew) <= exact * (1.0 + 1e-12) && peak(&slew) > exact * (1.0 - 18.0 / 76.0_f64.powi(2)), "{}", peak(&slew));
+        assert_eq!(slew["exceedances"].as_array().unwrap().len(), 2);
+        // work done by steps of T / 38 in a slew of 1.76 J: (1 / 38)^4 / 120 of it at the third order of the worse method
+        assert!(slew["errors"]["energy"].as_f64().unwrap() < 38.0_f64.powi(-4), "{}", slew["errors"]["energy"]);
+        let sine = run("{ sine = { amplitude = 0.2, frequency_hz = 3.0 } }", &["--integrator", integrator]);
+        let exact = 0.2 * (6.0 * std::f64::consts::PI).powi(2);
+        assert!(peak(&sine) <= exact * (1.0 + 1e-12) && peak(&sine) > exact * (std::f64::consts::PI / 40.0).cos(), "{}", peak(&sine));
+        // the spline of a table begins with an acceleration at once: (0, 0.4) at rest at both ends, 6 d / T^2
+        let table = run("{ table = [[0.0, 0.0], [1.0, 0.4]] }", &["--integrator", integrator]);
+        assert!((peak(&table) - 2.4).abs() < 1e-9, "{}", peak(&table));
+    }
+}
+
+/// Rounding of a triangle that carries its weight is no loss of energy, though nothing else moves.
+#[test]
+fn a_structure_at_rest_keeps_its_energy() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.toml");
+    let hinge = |name: &str, child: &str, at: &str| {
+        format!(
+            "[[hinge]]\nname = \"{name}\"\nkind = \"revolute\"\naxis = [0.0, 1.0, 0.0]\nparent = \"world\"\nparent_frame = {{ position = {at} }}\n\
+             child = \"{child}\"\n"
+        )
+    };
+    let body = |name: &str, center: &str| {
+        format!(
+            "[[body]]\nname = \"{name}\"\nmass = 3.0\ncenter_of_mass = {center}\ninertia = [[0.1, 0.0, 0.0], [0.0, 3.0, 0.0], [0.0, 0.0, 3.0]]\n"
+        )
+    };
+    let text = format!(
+        "gravity = [0.0, 0.0, -9.81]\n{}{}{}{}[[closure]]\nname = \"top\"\nkind = \"revolute\"\naxis = [0.0, 1.0, 0.0]\nbody_a = \"strut\"\n\
+         frame_a = {{ position = [0.0, 0.0, 1.0] }}\nbody_b = \"rod\"\nframe_b = {{ position = [2.0, 0.0, 0.0] }}\n[simulation]\nduration = 0.5\n",
+        body("rod", "[0.5, 0.0, 0.0]"),
+        body("strut", "[0.1, 0.0, 0.3]"),
+        hinge("left", "rod", "[0.0, 0.0, 0.0]"),
+        hinge("base", "strut", "[2.0, 0.0, -1.0]")
+    );
+    std::fs::write(&path, text).unwrap();
+    let done = pliant(&["run", path.to_str().unwrap(), "--viewer", "none", "--json"]);
+    assert_eq!(done.status.code(), Some(0), "{}", text_of(&done));
+    let report: Value = serde_json::from_slice(&done.stdout).unwrap();
+    // rounding of the energies, some eps, against the square root of eps of them
+    let error = report["errors"]["energy"].as_f64().unwrap();
+    assert!(error < 100.0 * f64::EPSILON.sqrt(), "{error}");
+}
+
+/// Modes take part in closing a loop, which may be a preload that nobody meant; rates that a loop does not allow are changed.
+#[test]
+fn what_assembly_does_to_given_values_is_said() {
+    let closure = |frame: &str| {
+        let to = format!(
+            "[[closure]]\nname = \"tie\"\nkind = \"spherical\"\nbody_a = \"boom\"\nnode_a = \"tip\"\nbody_b = \"world\"\nframe_b = {{ position = {frame} }}\n[simulation]"
+        );
+        let done = with_change("check", "[simulation]", &to);
+        assert_eq!(done.status.code(), Some(0), "{}", text_of(&done));
+        text(&done.stdout)
+    };
+    let bent = closure("[3.0, 0.0, 0.01]");
+    for part in ["warning: ", "stay open by 0.01", "by bending \"boom\" (strain energy ", "preload"] {
+        assert!(bent.contains(part), "no \"{part}\" in: {bent}");
+    }
+    assert!(!closure("[3.0, 0.0, 0.0]").contains("warning"));
+    let (sine, cosine) = 0.2_f64.sin_cos();
+    let lock = format!(
+        "velocity = [1.0]\nposition = [0.2]\n[[closure]]\nname = \"lock\"\nkind = \"spherical\"\nbody_a = \"bob\"\n\
+         frame_a = {{ position = [0.3, 0.0, 0.0] }}\nbody_b = \"boom\"\nnode_b = \"tip\"\nframe_b = {{ position = [{}, 0.0, {}] }}\n",
+        0.3 * cosine,
+        -0.3 * sine
+    );
+    let turned = text(&with_change("check", "position = [0.2]\n", &lock).stdout);
+    assert!(turned.contains("change the given velocity of hinge \"pin\" from 1.000 to "), "{turned}");
+}
+
 /// One scene serves a comparison: a stress monitor does not stand in the way of a body that is to be rigid.
 #[test]
 fn stress_of_a_body_without_modes_is_left_out_and_said() {
@@ -229,6 +327,9 @@ fn stress_of_a_body_without_modes_is_left_out_and_said() {
     let (bodies, left_out) = run(&["--rigid", "panel_left"]);
     assert_eq!(bodies, ["panel_right"]);
     assert!(left_out.iter().any(|line| line == "stress of \"panel_left\", which retains no mode"), "{left_out:?}");
+    let rigid = pliant(&["run", example.to_str().unwrap(), "--viewer", "none", "--duration", "0.1", "--rigid", "panel_left"]);
+    let warned = "warning: the stress limit of \"panel_left\" is not watched: the body retains no mode";
+    assert!(text(&rigid.stdout).contains(warned), "{}", text(&rigid.stdout));
     let (bodies, left_out) = run(&["--modes", "0"]);
     assert!(bodies.is_empty() && left_out.iter().any(|line| line.contains("stress of \"panel_left\"")), "{bodies:?} {left_out:?}");
 }

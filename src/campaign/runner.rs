@@ -39,6 +39,7 @@ pub struct Campaign {
     loads: Vec<LoadRecord>,
     header: Header,
     inputs: Vec<std::path::PathBuf>,
+    remarks: Vec<String>,
     files: Mutex<ModalFiles>,
 }
 
@@ -82,10 +83,11 @@ impl Campaign {
             parameters: parameters.collect(),
             loads: loads.clone(),
         };
+        let remarks = remarks(&base);
         let mut inputs = vec![path.to_owned()];
         inputs.extend(plan.inputs.iter().cloned());
         inputs.extend(base.flexible.iter().flat_map(|(_, selection)| selection.file.inputs().iter().cloned()));
-        Ok(Self { source, document, overrides, plan, loads, header, inputs, files: Mutex::new(base.modal_files()) })
+        Ok(Self { source, document, overrides, plan, loads, header, inputs, remarks, files: Mutex::new(base.modal_files()) })
     }
 
     /// The heading of the records of a shard.
@@ -98,6 +100,12 @@ impl Campaign {
     #[must_use]
     pub fn inputs(&self) -> &[std::path::PathBuf] {
         &self.inputs
+    }
+
+    /// What a user should know before it runs: of the scene as it stands, and what a campaign leaves out of it.
+    #[must_use]
+    pub fn remarks(&self) -> &[String] {
+        &self.remarks
     }
 
     /// The scene's text with the values of a case, counted from 0.
@@ -242,6 +250,22 @@ fn with_causes(error: &dyn std::error::Error) -> String {
 
 fn as_json(value: &Value) -> serde_json::Value {
     serde_json::to_value(value).unwrap_or_default()
+}
+
+/// What is to be said of the scene as it stands, and of what a campaign leaves out of it.
+fn remarks(scene: &Scene) -> Vec<String> {
+    let mut remarks = scene.warnings.clone();
+    let partial = scene.flexible.iter().filter(|(_, selection)| !selection.basis.is_complete());
+    let partial: Vec<_> = partial.map(|(body, _)| format!("\"{}\"", scene.system.bodies[*body].name)).collect();
+    if !partial.is_empty() {
+        let bodies = partial.join(", ");
+        remarks
+            .push(format!("modes of {bodies} are left out; a campaign does not estimate what they change, pliant run on the scene does"));
+    }
+    if !scene.monitors.is_empty() {
+        remarks.push("the limits of [[monitor]] are not watched; hold the envelope against them".into());
+    }
+    remarks
 }
 
 /// The loads of a scene in words.

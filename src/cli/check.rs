@@ -52,9 +52,13 @@ fn check_scene(file: &Path, output: &mut dyn Write) -> Result<(serde_json::Value
                 "  \"{}\": {} bodies, {} hinge rates, {} modes, {} loads; load audit at the start {:.1e}",
                 scene.name, counts.0, counts.1, counts.2, counts.3, evaluation.audit.load_residual
             )?;
+            for warning in &scene.warnings {
+                writeln!(output, "  warning: {warning}")?;
+            }
             let object = serde_json::json!({
                 "file": file.to_string_lossy(),
                 "accepted": true,
+                "warnings": scene.warnings,
                 "bodies": counts.0,
                 "hinge_rates": counts.1,
                 "modes": counts.2,

@@ -32,6 +32,10 @@ pub fn run(arguments: &EvalArguments, output: &mut dyn Write) -> Result<(), Fail
     state.apply_prescribed(&scene.system);
     assembly::assemble(&scene.system, &mut state).map_err(|e| Failure::input(e.to_string()))?;
     let evaluation = Evaluation::of(&scene.system, &state)?;
+    for warning in &scene.warnings {
+        // standard output is for the evaluation alone
+        let _ = writeln!(std::io::stderr(), "warning: {warning}");
+    }
     if arguments.json {
         let text = serde_json::to_string_pretty(&evaluation).map_err(|e| Failure::Output(e.into()))?;
         writeln!(output, "{text}")?;

@@ -195,6 +195,7 @@ fn plan(scene: &Scene, _picture: bool) -> Result<OutputPlan, Failure> {
         monitors: scene.monitors.clone(),
         deformation_scale: scene.deformation_scale,
         audit: scene.audit,
+        warnings: scene.warnings.clone(),
         ..OutputPlan::default()
     })
 }

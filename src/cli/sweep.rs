@@ -41,6 +41,9 @@ pub fn run(arguments: &SweepArguments, output: &mut dyn Write) -> Result<(), Fai
     let total = shard.cases(records.header.cases).count();
     let threads = arguments.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
     announce(&records, resumed, total, threads);
+    for remark in campaign.remarks() {
+        let _ = writeln!(std::io::stderr(), "warning: {remark}");
+    }
     let interrupted = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&interrupted);
     // without a handler Ctrl-C ends the process at once, which loses only the cases that are going on

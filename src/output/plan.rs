@@ -79,6 +79,8 @@ pub struct OutputPlan {
     pub truncation: Option<TruncationPlan>,
     /// True if an independent Newton-Euler sweep checks the loads at every output time.
     pub audit: bool,
+    /// What is known to be worth a warning before the run.
+    pub warnings: Vec<String>,
 }
 
 impl Default for OutputPlan {
@@ -95,6 +97,7 @@ impl Default for OutputPlan {
             deformation_scale: 1.0,
             truncation: None,
             audit: false,
+            warnings: Vec::new(),
         }
     }
 }

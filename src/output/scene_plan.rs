@@ -64,6 +64,7 @@ pub fn plan(scene: &Scene, picture: bool) -> Result<OutputPlan, ModalFileError> 
         deformation_scale: scene.deformation_scale,
         audit: scene.audit,
         truncation,
+        warnings: scene.warnings.clone(),
     })
 }
 

@@ -115,7 +115,8 @@ impl<'s> OutputSet<'s> {
         let end = summary.end.is_finite().then(|| Evaluation::of(self.system, &summary.end).ok()).flatten();
         let truncation = self.truncation.as_ref().map(|gauge| gauge.report(self.system));
         let peaks = self.tracker.peaks(self.system);
-        let mut warnings = self.tracker.warnings(self.system);
+        let mut warnings = std::mem::take(&mut self.plan.warnings);
+        warnings.extend(self.tracker.warnings(self.system));
         warnings.extend(truncation.as_ref().and_then(|t| truncation_warning(t, &peaks)));
         RunReport {
             simulated_s: summary.time,

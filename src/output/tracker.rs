@@ -126,6 +126,8 @@ pub struct Tracker {
     energy_error: f64,
     largest_kinetic: f64,
     largest_change: f64,
+    /// Largest strain and potential energy.
+    largest_stored: f64,
     linear_drift: f64,
     angular_drift: f64,
     span: f64,
@@ -189,6 +191,7 @@ impl Tracker {
             energy_error: 0.0,
             largest_kinetic: 0.0,
             largest_change: 0.0,
+            largest_stored: 0.0,
             linear_drift: 0.0,
             angular_drift: 0.0,
             span: 0.0,
@@ -226,6 +229,8 @@ impl Tracker {
     /// Takes in the end of a step: loads peak between output times too.
     pub fn follow_step(&mut self, step: &Sample<'_>) {
         let time = step.state.time;
+        // work that comes and goes between output times is motion too
+        self.largest_change = self.largest_change.max(step.work.abs());
         self.stiffening.follow(step);
         for (load, &k) in self.loads.iter_mut().zip(&self.loaded) {
             *load = hinge_load(step.workspace, k);
@@ -295,6 +300,7 @@ impl Tracker {
         let start = *self.start.get_or_insert(Start { energy: energy.total() - sample.work, stored, momentum });
         self.energy_error = self.energy_error.max((energy.total() - start.energy - sample.work).abs());
         self.largest_kinetic = self.largest_kinetic.max(energy.kinetic);
+        self.largest_stored = self.largest_stored.max(energy.strain.abs()).max(energy.potential.abs());
         self.largest_change = self.largest_change.max((stored - start.stored).abs()).max(sample.work.abs());
         self.linear_drift = self.linear_drift.max((momentum.linear - start.momentum.linear).norm());
         self.angular_drift = self.angular_drift.max((momentum.angular - start.momentum.angular).norm());
@@ -328,8 +334,9 @@ impl Tracker {
     /// Error figures so far; `local` is that of the step control.
     #[must_use]
     pub fn errors(&self, local: Option<f64>) -> ErrorFigures {
-        // slow loading stores energy without moving much: measure against what moved or came and went, whichever is more
-        let scale = self.largest_kinetic.max(self.largest_change);
+        // slow loading stores energy without moving much: measure against what moved or came and went, whichever is more; of a structure at
+        // rest under load only rounding does, which its changes show to half of the digits at best
+        let scale = self.largest_kinetic.max(self.largest_change).max(f64::EPSILON.sqrt() * self.largest_stored);
         ErrorFigures {
             energy: ratio(self.energy_error, scale),
             momentum: self.isolated.then(|| self.momentum_error()),

@@ -6,6 +6,7 @@ use super::locate::{Step, first_not_finite};
 #[cfg(feature = "hdf5")]
 use super::modal_files::ModalFiles;
 use super::outputs::{Monitor, Outputs, describe_left_out};
+use super::remarks::remarks;
 use super::settings;
 use super::spec::{BodySpec, FunctionSpec, HingeSpec, LoadSpec, Numbers, SceneSpec};
 use crate::dynamics::closed_chain::assembly;
@@ -82,6 +83,8 @@ pub struct Scene {
     pub flexible: Vec<(usize, super::modal_files::Selection)>,
     /// What the scene does not need or was told to leave out.
     pub left_out: Vec<String>,
+    /// What a user should know before it runs.
+    pub warnings: Vec<String>,
     /// The scene's keys as they were assembled.
     #[cfg(feature = "hdf5")]
     spec: SceneSpec,
@@ -219,7 +222,8 @@ fn assemble_spec(source: Source, spec: SceneSpec, overrides: &Overrides, files: 
     };
     let definition = assembly.definition(&spec)?;
     let (system, mut state) = definition.build().map_err(|e| source.model(&e))?;
-    assembly::assemble(&system, &mut state)
+    let given = state.clone();
+    let assembled = assembly::assemble(&system, &mut state)
         .map_err(|e| source.value(&[Step::Key("closure"), Step::Index(e.closure), Step::Key("name")], e.to_string()))?;
 
     if !(spec.output.rate_hz > 0.0) {
@@ -233,6 +237,7 @@ fn assemble_spec(source: Source, spec: SceneSpec, overrides: &Overrides, files: 
     let (method, method_reason) =
         settings::method(&spec.simulation, &control, overrides.integrator.as_deref(), &system, spec.output.rate_hz, &source)?;
     let Outputs { hinges, closures, stress, monitors } = assembly.outputs(&spec, &system)?;
+    let warnings = remarks(&system, &given, &state, &assembled, &monitors);
     let mut boxes = vec![None; system.bodies.len()];
     for (body, &k) in spec.body.iter().zip(&system.definition_order) {
         boxes[k] = body.box_size;
@@ -268,6 +273,7 @@ fn assemble_spec(source: Source, spec: SceneSpec, overrides: &Overrides, files: 
         #[cfg(feature = "hdf5")]
         flexible,
         left_out,
+        warnings,
         #[cfg(feature = "hdf5")]
         spec,
         #[cfg(feature = "hdf5")]

@@ -12,6 +12,7 @@ pub mod locate;
 #[cfg(feature = "hdf5")]
 pub mod modal_files;
 mod outputs;
+mod remarks;
 pub mod settings;
 pub mod spec;
 

@@ -46,6 +46,8 @@ pub struct Assembled {
     pub positions: bool,
     /// Whether rates were changed.
     pub rates: bool,
+    /// What hinges alone left open (m or rad), if modes had to be moved too.
+    pub bent: Option<f64>,
 }
 
 /// Closes the loops of `state`; nothing happens without closures or if it fits.
@@ -60,6 +62,7 @@ pub fn assemble(system: &System, state: &mut State) -> Result<Assembled, Assembl
         done.positions = true;
         for modes in [false, true] {
             if drift.position > FITS && (!modes || system.modal_count > 0) {
+                done.bent = modes.then_some(drift.position);
                 close_positions(system, state, &mut workspace, modes);
                 drift = measure(system, state, &mut workspace);
             }
