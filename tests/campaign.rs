@@ -379,7 +379,7 @@ fn a_state_of_another_campaign_is_refused_and_what_differs_is_named() {
         message
     };
     let message = differs(&["--integrator", "rk4"]);
-    assert!(message.contains("of another campaign: the options of the command line is not the same"), "{message}");
+    assert!(message.contains("of another campaign: the options of the command line are not the same"), "{message}");
     let message = differs(&["--shard", "1/2"]);
     assert!(message.contains("the shard (1/1 there) is not the same"), "{message}");
     fs::write(folder.path("scene.toml"), PANEL.replace("0.2", "0.3")).unwrap();

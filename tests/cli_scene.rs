@@ -111,7 +111,34 @@ fn faults_of_a_scene_are_named_with_line_key_and_remedy_and_exit_2() {
         ("duration = 0.2", "duration = -1.0", &["simulation.duration", "must be positive"]),
         ("duration = 0.2", "integrator = \"rk5\"", &["simulation.integrator", "\"rk5\"", "dormand_prince"]),
         ("[simulation]", "[[closure]]\nname = \"c\"\n[simulation]", &["closure"]),
-        ("[simulation]", "[[monitor]]\nhinge = \"pn\"\n[simulation]", &["monitor[1].hinge", "\"pn\" is not a hinge"]),
+        (
+            "[simulation]",
+            "[[monitor]]\nhinge = \"pn\"\n[simulation]",
+            &["monitor[1].hinge", "\"pn\" is not a hinge", "there are: \"root\", \"pin\""],
+        ),
+        ("[simulation]", "[[monitor]]\nbody = \"bob\"\n[simulation]", &["\"bob\" is not a flexible body", "there are: \"boom\""]),
+        ("[simulation]", "[[monitor]]\nclosure = \"c\"\n[simulation]", &["\"c\" is not a closure", "there are: none"]),
+        ("[simulation]", "[output]\nhinges = [\"pn\"]\n[simulation]", &["output.hinges[1]", "there are: \"root\", \"pin\""]),
+        ("position = [0.2]", "torque = 0.5", &["line 28", "a time function, as { constant = 0.5 }"]),
+        ("position = [0.2]", "torque = { constnt = 0.5 }", &["unknown field `constnt`", "constant"]),
+        (
+            "[simulation]",
+            "[[load]]\nbody = \"bob\"\nforce = [0.0, 0.0, 1.0]\n[simulation]",
+            &["line 32", "a time function", "{ constant = [0.0, 0.0, 1.0] }"],
+        ),
+        (
+            "[simulation]",
+            "[[load]]\nbody = \"boom\"\npoint = [1.0, 0.0, 0.0]\nforce = { constant = [0.0, 0.0, 1.0] }\n[simulation]",
+            &["load[1].point", "point belongs to rigid bodies", "give node, one of \"root\", \"tip\", or mesh_node"],
+        ),
+        (
+            "[simulation]",
+            "[[load]]\nbody = \"bob\"\nnode = \"tip\"\nforce = { constant = [0.0, 0.0, 1.0] }\n[simulation]",
+            &["load[1].node", "\"bob\" is not flexible", "give point = [x, y, z] instead"],
+        ),
+        ("name = \"bob\"", "name = \"world\"", &["body[2].name", "stands for the inertial frame", "another name"]),
+        ("name = \"bob\"", "name = \"boom\"", &["two bodies share the name \"boom\""]),
+        ("name = \"pin\"", "name = \"\"", &["hinge[2].name", "it is empty"]),
         ("[simulation]", "[[load]]\nbody = \"bob\"\n[simulation]", &["load[1]", "force, moment or both"]),
         ("[simulation]", "[simulation", &["line 30", "TOML parse error"]),
         ("name = \"pendulum on a boom\"", "seed = 2026", &["unknown field `seed`", "plan of a campaign", "pliant sweep SCENE.toml"]),
@@ -167,7 +194,12 @@ fn a_scene_without_duration_is_evaluated_but_not_run() {
 fn a_missing_scene_says_so() {
     let done = pliant(&["run", "no/such/scene.toml"]);
     assert_eq!(done.status.code(), Some(2));
-    assert!(text(&done.stderr).contains("no/such/scene.toml: cannot read the scene"));
+    let message = text(&done.stderr);
+    assert!(message.contains("no/such/scene.toml: cannot read the scene: ") && message.contains("name a scene file (.toml)"), "{message}");
+    assert!(!message.contains("caused by"), "{message}");
+    let results = root().join("modes/panel_cantilever.h5");
+    let done = pliant(&["run", results.to_str().unwrap()]);
+    assert!(text(&done.stderr).contains("it is not a text; name a scene file (.toml)"), "{}", text(&done.stderr));
 }
 
 #[test]

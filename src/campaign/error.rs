@@ -80,6 +80,7 @@ pub enum CampaignError {
 /// "the scene is", "the scene and the plan are".
 fn listed(names: &[String]) -> String {
     match names {
+        [one] if one.starts_with("the options") => format!("{one} are"),
         [one] => format!("{one} is"),
         [first @ .., last] => format!("{} and {last} are", first.join(", ")),
         [] => "something is".into(),

@@ -74,7 +74,7 @@ pub struct Plan {
 }
 
 fn read(path: &Path) -> Result<String, SceneError> {
-    std::fs::read_to_string(path).map_err(|source| SceneError::Read { path: path.to_owned(), source })
+    std::fs::read_to_string(path).map_err(|e| SceneError::unreadable(path, "plan", &e))
 }
 
 impl Plan {

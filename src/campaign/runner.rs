@@ -52,7 +52,7 @@ impl Campaign {
     /// # Errors
     /// If the scene or the plan cannot be, or a key of the plan is none of the scene.
     pub fn new(path: &Path, overrides: Overrides, plan: Plan) -> Result<Self, CampaignError> {
-        let text = std::fs::read_to_string(path).map_err(|source| SceneError::Read { path: path.to_owned(), source })?;
+        let text = std::fs::read_to_string(path).map_err(|e| SceneError::unreadable(path, "scene", &e))?;
         let source = Source { path: path.to_owned(), text };
         let base = assemble::assemble(source.clone(), &overrides)?;
         let unfit = |message: &str| CampaignError::Unfit { path: path.to_owned(), message: message.to_owned() };

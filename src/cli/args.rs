@@ -345,6 +345,7 @@ fn switch(text: &str) -> Result<bool, String> {
 fn budget(text: &str) -> Result<f64, String> {
     let (number, unit) = text.strip_suffix('%').map_or((text, 1.0), |n| (n.trim_end(), 0.01));
     match number.parse::<f64>() {
+        Ok(x) if unit == 1.0 && x >= 1.0 => Err(format!("{text} would be {:.0} %; write {text}% or a share below 1", 100.0 * x)),
         Ok(x) if x > 0.0 && x.is_finite() => Ok(unit * x),
         _ => Err("write a positive share, as 1% or 0.01".to_owned()),
     }

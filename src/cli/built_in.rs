@@ -17,7 +17,7 @@ pub struct Unpacked {
 impl Unpacked {
     /// Writes the files.
     pub fn new() -> Result<Self, SceneError> {
-        let wrap = |path: &Path, source: std::io::Error| SceneError::Read { path: path.to_owned(), source };
+        let wrap = |path: &Path, error: std::io::Error| SceneError::unreadable(path, "scene", &error);
         let folder = tempfile::tempdir().map_err(|e| wrap(&std::env::temp_dir(), e))?;
         for (name, bytes) in FILES {
             let path = folder.path().join(name);

@@ -25,7 +25,7 @@ const MOST_FRONT: usize = 6;
 pub fn run(arguments: &StudyArguments, output: &mut dyn Write) -> Result<(), Failure> {
     check(arguments)?;
     let path = &arguments.scene;
-    let text = std::fs::read_to_string(path).map_err(|source| SceneError::Read { path: path.clone(), source })?;
+    let text = std::fs::read_to_string(path).map_err(|e| SceneError::unreadable(path, "scene", &e))?;
     let source = Source { path: path.clone(), text };
     let request = Request {
         integrators: arguments.integrators.clone(),

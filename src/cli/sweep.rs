@@ -29,7 +29,7 @@ pub fn run(arguments: &SweepArguments, output: &mut dyn Write) -> Result<(), Fai
     let shard = arguments.shard.map_or(Shard::WHOLE, |(index, count)| Shard { index, count });
     let header = campaign.header(shard);
     if let Some(case) = arguments.show_case {
-        return show_case(&campaign, case, header.cases, output);
+        return show_case(&campaign, case, header.cases, &given_options(arguments), output);
     }
     let out = arguments.out.clone().unwrap_or_default();
     let state = arguments.state.clone().unwrap_or_else(|| state_beside(&out, arguments.shard));
@@ -117,13 +117,27 @@ fn check_targets(inputs: &[PathBuf], targets: &[(&str, Option<&PathBuf>)]) -> Re
     Ok(())
 }
 
-fn show_case(campaign: &Campaign, case: usize, cases: usize, output: &mut dyn Write) -> Result<(), Failure> {
+/// Options that change the scene, as they were given: the printed scene does not have them.
+fn given_options(arguments: &SweepArguments) -> String {
+    let scene = &arguments.overrides;
+    let mut options = Vec::new();
+    options.extend(arguments.duration.map(|d| format!("--duration {d}")));
+    options.extend(scene.integrator.as_ref().map(|i| format!("--integrator {i}")));
+    options.extend(scene.modes.map(|n| format!("--modes {n}")));
+    options.extend(scene.residual_modes.then(|| "--residual-modes".to_owned()));
+    options.extend(scene.rigid.iter().map(|body| format!("--rigid \"{body}\"")));
+    options.extend(scene.closure_method.as_ref().map(|m| format!("--closure-method {m}")));
+    options.join(" ")
+}
+
+fn show_case(campaign: &Campaign, case: usize, cases: usize, options: &str, output: &mut dyn Write) -> Result<(), Failure> {
     let Some(index) = case.checked_sub(1).filter(|index| *index < cases) else {
         return Err(Failure::input(format!("--show-case {case}: the campaign has cases 1 to {cases}")));
     };
     let document = campaign.document(index).map_err(|e| Failure::input(format!("case {case}: {e}")))?;
     let text = toml::to_string(&document).map_err(|e| Failure::input(format!("case {case}: {e}")))?;
-    Ok(write!(output, "# case {case}\n{text}")?)
+    let with = if options.is_empty() { String::new() } else { format!(", to be run with {options}") };
+    Ok(write!(output, "# case {case}{with}\n{text}")?)
 }
 
 /// What is about to run, on standard error.

@@ -96,8 +96,15 @@ impl Builder<'_> {
         let closures = self.definition.closures.iter().enumerate().map(|(i, c)| (i, &c.name, "closure"));
         let mut seen = HashMap::new();
         for (index, name, section) in bodies.chain(hinges).chain(closures) {
-            let reserved = section == "body" && name == WORLD;
-            if reserved || seen.insert((section, name), index).is_some() {
+            let reason = match name.as_str() {
+                "" => Some("it is empty"),
+                WORLD if section == "body" => Some("the name stands for the inertial frame"),
+                _ => None,
+            };
+            if let Some(reason) = reason {
+                return Err(ModelError::BadName { place: place(section, index, "name"), name: name.clone(), reason });
+            }
+            if seen.insert((section, name), index).is_some() {
                 return Err(ModelError::DuplicateName { place: place(section, index, "name"), name: name.clone() });
             }
         }
@@ -386,10 +393,9 @@ impl Builder<'_> {
                 });
             }
             (PointDefinition::Point(_), BodyDefinitionKind::Flexible(flexible)) => {
-                return Err(ModelError::UnknownInterface {
+                return Err(ModelError::PointOfFlexibleBody {
                     place: place("load", index, "point"),
                     item,
-                    found: "a point".into(),
                     body: given.body.clone(),
                     known: list(flexible.modal.interfaces.iter().map(|i| i.name.clone())),
                 });

@@ -21,7 +21,7 @@ pub enum ModelError {
     #[error("the system has no bodies; add at least one [[body]] and the [[hinge]] that carries it")]
     Empty,
     /// Two items of one name.
-    #[error("two {0} share the name \"{1}\"; names must be unique", place.section.to_owned() + "s", name)]
+    #[error("two {} share the name \"{name}\"; names must be unique", if place.section == "body" { "bodies".into() } else { place.section.to_owned() + "s" })]
     DuplicateName {
         /// Where.
         place: Place,
@@ -40,6 +40,31 @@ pub enum ModelError {
         /// Names that exist.
         known: String,
     },
+    /// A name that is empty or stands for something else.
+    #[error("a {} named \"{name}\": {reason}; give it another name", place.section)]
+    BadName {
+        /// Where.
+        place: Place,
+        /// The name.
+        name: String,
+        /// What is wrong with it.
+        reason: &'static str,
+    },
+    /// A point given on a flexible body.
+    #[error(
+        "load {item}: point belongs to rigid bodies, and \"{body}\" is flexible, with displacements at interfaces and mesh nodes only; give node, one of \
+         {known}, or mesh_node"
+    )]
+    PointOfFlexibleBody {
+        /// Where.
+        place: Place,
+        /// Number of the load.
+        item: String,
+        /// The body.
+        body: String,
+        /// Its interfaces.
+        known: String,
+    },
     /// An interface that the body does not have.
     #[error("{} \"{item}\": {} = \"{found}\" is not an interface of body \"{body}\"; it has {known}", place.section, place.key)]
     UnknownInterface {
@@ -55,7 +80,7 @@ pub enum ModelError {
         known: String,
     },
     /// An interface asked for on a rigid body or the world.
-    #[error("{} \"{item}\": {} = \"{found}\", but \"{body}\" is not flexible and has no interfaces; give a frame instead", place.section, place.key)]
+    #[error("{} \"{item}\": {} = \"{found}\", but \"{body}\" is not flexible and has no interfaces; give {} instead", place.section, place.key, if place.section == "load" { "point = [x, y, z]" } else { "a frame" })]
     InterfaceOfRigidBody {
         /// Where.
         place: Place,
@@ -245,6 +270,8 @@ impl ModelError {
             Self::Empty => None,
             Self::DuplicateName { place, .. }
             | Self::UnknownBody { place, .. }
+            | Self::BadName { place, .. }
+            | Self::PointOfFlexibleBody { place, .. }
             | Self::UnknownInterface { place, .. }
             | Self::InterfaceOfRigidBody { place, .. }
             | Self::MissingInterface { place, .. }

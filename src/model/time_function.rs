@@ -238,10 +238,9 @@ impl TimeFunction {
     #[must_use]
     pub fn resolution(&self, t: f64) -> f64 {
         match self {
-            Self::Constant(_) => f64::INFINITY,
-            Self::Sine { frequency_hz, .. } => 1.0 / (SINE_PARTS * frequency_hz.abs()),
-            Self::SmoothStep { start, end, .. } if t > *start && t < *end => (end - start) / SMOOTH_STEP_PARTS,
-            Self::SmoothStep { .. } => f64::INFINITY,
+            Self::Sine { amplitude, frequency_hz, .. } if amplitude.iter().any(|a| *a != 0.0) => 1.0 / (SINE_PARTS * frequency_hz.abs()),
+            Self::SmoothStep { from, to, start, end } if from != to && t > *start && t < *end => (end - start) / SMOOTH_STEP_PARTS,
+            Self::Constant(_) | Self::Sine { .. } | Self::SmoothStep { .. } => f64::INFINITY,
             Self::Table(table) => table.resolution(t),
             Self::Sum(terms) => terms.iter().map(|f| f.resolution(t)).fold(f64::INFINITY, f64::min),
         }

@@ -161,7 +161,7 @@ impl Scene {
 /// # Errors
 /// [`SceneError`] with file, line, column, key, what was found and what to write instead.
 pub fn load(path: &Path, overrides: &Overrides) -> Result<Scene, SceneError> {
-    let text = std::fs::read_to_string(path).map_err(|source| SceneError::Read { path: path.to_owned(), source })?;
+    let text = std::fs::read_to_string(path).map_err(|e| SceneError::unreadable(path, "scene", &e))?;
     assemble(Source { path: path.to_owned(), text }, overrides)
 }
 

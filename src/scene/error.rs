@@ -3,19 +3,21 @@
 use super::locate::{Location, Step, locate};
 use crate::model::ModelError;
 use crate::model::error::Place;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 /// Why a scene cannot be used.
 #[derive(Debug, Error)]
 pub enum SceneError {
     /// The file cannot be read.
-    #[error("{}: cannot read the scene: {source}", path.display())]
+    #[error("{}: cannot read the {what}: {cause}; name a {what} file (.toml) that exists", path.display())]
     Read {
-        /// The scene.
+        /// The file.
         path: PathBuf,
-        /// What the system says.
-        source: std::io::Error,
+        /// What it should be: "scene", say.
+        what: &'static str,
+        /// What the system says, or that it is no text.
+        cause: String,
     },
     /// The text is not TOML, or a key or type does not belong there; the message shows line and column.
     #[error("{}: {message}", path.display())]
@@ -65,6 +67,15 @@ pub enum SceneError {
         /// What is wrong and what is possible.
         message: String,
     },
+}
+
+impl SceneError {
+    /// A file that cannot be read as `what`.
+    #[must_use]
+    pub fn unreadable(path: &Path, what: &'static str, error: &std::io::Error) -> Self {
+        let cause = if error.kind() == std::io::ErrorKind::InvalidData { "it is not a text".to_owned() } else { error.to_string() };
+        Self::Read { path: path.to_owned(), what, cause }
+    }
 }
 
 /// Text of a scene with its path: makes errors that point into it.

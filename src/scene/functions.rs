@@ -25,7 +25,8 @@ pub fn function(spec: &FunctionSpec, source: &Source, steps: &[Step]) -> Result<
             TableSpec::Rows(rows) => rows.iter().map(|(t, x)| (*t, x.list())).collect(),
             TableSpec::File(file) => csv_rows(file, source, &at("table"))?,
         };
-        return Table::new(&rows).map(TimeFunction::Table).map_err(|e| source.value(&at("table"), e.to_string()));
+        let of_file = if let TableSpec::File(file) = table { format!("{}: ", file.display()) } else { String::new() };
+        return Table::new(&rows).map(TimeFunction::Table).map_err(|e| source.value(&at("table"), format!("{of_file}{e}")));
     }
     if let Some(sine) = &spec.sine {
         if !(sine.frequency_hz >= 0.0) {

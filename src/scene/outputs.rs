@@ -53,11 +53,13 @@ impl Assembly<'_> {
     pub(super) fn outputs(&mut self, spec: &SceneSpec, system: &System) -> Result<Outputs, SceneError> {
         let hinges = match &spec.output.hinges {
             None => system.definition_order.clone(),
-            Some(names) => names_to_indices(names, "hinges", "hinge", |n| system.hinge_index(n), self.source)?,
+            Some(names) => names_to_indices(names, "hinges", "hinge", |n| system.hinge_index(n), &|| hinge_names(system), self.source)?,
         };
         let closures = match &spec.output.closures {
             None => (0..system.closures.len()).collect(),
-            Some(names) => names_to_indices(names, "closures", "closure", |n| closure_index(system, n), self.source)?,
+            Some(names) => {
+                names_to_indices(names, "closures", "closure", |n| closure_index(system, n), &|| closure_names(system), self.source)?
+            }
         };
         let monitors = spec.monitor.iter().enumerate().map(|(i, m)| monitor(i, m, system, self.source));
         let monitors = monitors.collect::<Result<Vec<_>, _>>()?;
@@ -69,7 +71,14 @@ impl Assembly<'_> {
     fn stress(&mut self, spec: &SceneSpec, system: &System, monitors: &[Monitor]) -> Result<Vec<usize>, SceneError> {
         let named = match &spec.output.stress {
             None => None,
-            Some(names) => Some(names_to_indices(names, "stress", "flexible body", |n| flexible_index(system, n), self.source)?),
+            Some(names) => Some(names_to_indices(
+                names,
+                "stress",
+                "flexible body",
+                |n| flexible_index(system, n),
+                &|| flexible_names(system),
+                self.source,
+            )?),
         };
         let mut asked: Vec<(usize, Vec<Step>)> = Vec::new();
         for (i, monitor) in monitors.iter().enumerate() {
@@ -128,6 +137,26 @@ impl Assembly<'_> {
     }
 }
 
+/// What to say of a name that none of `known` is.
+fn unknown(name: &str, what: &str, known: Vec<String>) -> String {
+    let known: Vec<_> = known.iter().map(|n| format!("\"{n}\"")).collect();
+    let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
+    format!("\"{name}\" is not a {what} of the scene; there are: {known}")
+}
+
+fn hinge_names(system: &System) -> Vec<String> {
+    system.definition_order.iter().map(|&k| system.bodies[k].hinge.name.clone()).collect()
+}
+
+fn closure_names(system: &System) -> Vec<String> {
+    system.closures.iter().map(|c| c.name.clone()).collect()
+}
+
+fn flexible_names(system: &System) -> Vec<String> {
+    let bodies = system.definition_order.iter().map(|&k| &system.bodies[k]);
+    bodies.filter(|b| b.flexible().is_some()).map(|b| b.name.clone()).collect()
+}
+
 fn flexible_index(system: &System, name: &str) -> Option<usize> {
     system.body_index(name).filter(|&k| system.bodies[k].flexible().is_some())
 }
@@ -137,6 +166,7 @@ fn names_to_indices(
     key: &'static str,
     what: &str,
     find: impl Fn(&str) -> Option<usize>,
+    known: &dyn Fn() -> Vec<String>,
     source: &Source,
 ) -> Result<Vec<usize>, SceneError> {
     let steps = |i| [Step::Key("output"), Step::Key(key), Step::Index(i)];
@@ -144,7 +174,7 @@ fn names_to_indices(
         if names[..i].contains(name) {
             return Err(source.value(&steps(i), format!("\"{name}\" is named twice; name it once")));
         }
-        find(name).ok_or_else(|| source.value(&steps(i), format!("\"{name}\" is not a {what} of the scene")))
+        find(name).ok_or_else(|| source.value(&steps(i), unknown(name, what, known())))
     };
     names.iter().enumerate().map(index).collect()
 }
@@ -159,13 +189,12 @@ fn monitor(index: usize, spec: &MonitorSpec, system: &System, source: &Source) -
     let MonitorSpec { moment_limit, force_limit, stress_limit, .. } = *spec;
     match (&spec.hinge, &spec.closure, &spec.body) {
         (Some(name), None, None) if stress_limit.is_none() => {
-            let body =
-                system.hinge_index(name).ok_or_else(|| source.value(&at("hinge"), format!("\"{name}\" is not a hinge of the scene")))?;
+            let body = system.hinge_index(name).ok_or_else(|| source.value(&at("hinge"), unknown(name, "hinge", hinge_names(system))))?;
             Ok(Monitor::Hinge { body, moment_limit, force_limit })
         }
         (None, Some(name), None) if stress_limit.is_none() => {
             let closure = closure_index(system, name);
-            let closure = closure.ok_or_else(|| source.value(&at("closure"), format!("\"{name}\" is not a closure of the scene")))?;
+            let closure = closure.ok_or_else(|| source.value(&at("closure"), unknown(name, "closure", closure_names(system))))?;
             let refused = |key, unit, instead| {
                 let message =
                     format!("closure \"{name}\" is a gear, and what it exerts on coordinate b is in {unit}; give {instead} instead");
@@ -179,7 +208,7 @@ fn monitor(index: usize, spec: &MonitorSpec, system: &System, source: &Source) -
         }
         (None, None, Some(name)) if moment_limit.is_none() && force_limit.is_none() => {
             let body = flexible_index(system, name);
-            let body = body.ok_or_else(|| source.value(&at("body"), format!("\"{name}\" is not a flexible body of the scene")))?;
+            let body = body.ok_or_else(|| source.value(&at("body"), unknown(name, "flexible body", flexible_names(system))))?;
             Ok(Monitor::Body { body, stress_limit })
         }
         _ => Err(source.value(

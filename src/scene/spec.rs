@@ -1,7 +1,9 @@
 //! The scene file as serde reads it: one struct per table, one field per key, nothing interpreted.
 
 use super::import_spec::ImportSpec;
-use serde::Deserialize;
+use serde::de::{Error, MapAccess, Visitor};
+use serde::{Deserialize, Deserializer};
+use std::fmt::{self, Formatter};
 use std::path::PathBuf;
 
 /// One number, or one per coordinate.
@@ -63,8 +65,7 @@ pub struct SmoothStepSpec {
 }
 
 /// A time function: exactly one of the keys.
-#[derive(Debug, Clone, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, Clone, Default)]
 pub struct FunctionSpec {
     /// Same value at all times.
     pub constant: Option<Numbers>,
@@ -76,6 +77,37 @@ pub struct FunctionSpec {
     pub smooth_step: Option<SmoothStepSpec>,
     /// Sum of functions.
     pub sum: Option<Vec<FunctionSpec>>,
+}
+
+/// Only a table of keys is one: a number, or a list, is met with what to write instead.
+impl<'de> Deserialize<'de> for FunctionSpec {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Keys;
+        impl<'de> Visitor<'de> for Keys {
+            type Value = FunctionSpec;
+
+            fn expecting(&self, out: &mut Formatter<'_>) -> fmt::Result {
+                out.write_str("a time function, as { constant = 0.5 } or { constant = [0.0, 0.0, 1.0] } (or table, sine, smooth_step, sum)")
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<FunctionSpec, A::Error> {
+                const KEYS: &[&str] = &["constant", "table", "sine", "smooth_step", "sum"];
+                let mut spec = FunctionSpec::default();
+                while let Some(key) = map.next_key::<String>()? {
+                    match key.as_str() {
+                        "constant" => spec.constant = Some(map.next_value()?),
+                        "table" => spec.table = Some(map.next_value()?),
+                        "sine" => spec.sine = Some(map.next_value()?),
+                        "smooth_step" => spec.smooth_step = Some(map.next_value()?),
+                        "sum" => spec.sum = Some(map.next_value()?),
+                        other => return Err(A::Error::unknown_field(other, KEYS)),
+                    }
+                }
+                Ok(spec)
+            }
+        }
+        deserializer.deserialize_any(Keys)
+    }
 }
 
 /// A frame.
