@@ -164,6 +164,14 @@ fn check_targets(arguments: &RunArguments, scene: &Scene) -> Result<(), Failure>
             return Err(Failure::input(format!("{option} {} is an input of this run; write to another file", target.display())));
         }
     }
+    let other = |path: &Path, endings: &[&str]| path.extension().is_some_and(|e| endings.iter().any(|x| e.eq_ignore_ascii_case(x)));
+    if let Some(out) = arguments.out.as_ref().filter(|out| other(out, &["csv", "parquet", "rrd", "toml", "json", "xdmf", "txt"])) {
+        let message = format!("--out {} writes HDF5; name a file that ends in .h5, and make tables of it by pliant export", out.display());
+        return Err(Failure::input(message));
+    }
+    if let Some(rrd) = arguments.rrd.as_ref().filter(|rrd| other(rrd, &["h5", "hdf5", "csv", "parquet", "toml", "json"])) {
+        return Err(Failure::input(format!("--rrd {} writes a recording; name a file that ends in .rrd", rrd.display())));
+    }
     match (&arguments.out, &arguments.rrd) {
         (Some(out), Some(rrd)) if real(out) == real(rrd) => {
             Err(Failure::input(format!("--out and --rrd both name {}; give each its own file", out.display())))

@@ -229,6 +229,10 @@ fn assemble_spec(source: Source, spec: SceneSpec, overrides: &Overrides, files: 
     if !(spec.output.rate_hz > 0.0) {
         return Err(source.value(&[Step::Key("output"), Step::Key("rate_hz")], format!("{} must be positive", spec.output.rate_hz)));
     }
+    let scale = spec.viewer.deformation_scale;
+    if !(scale > 0.0) {
+        return Err(source.value(&[Step::Key("viewer"), Step::Key("deformation_scale")], format!("{scale} must be positive")));
+    }
     let duration = overrides.duration.or(spec.simulation.duration);
     if let Some(duration) = duration.filter(|d| !(*d > 0.0 && d.is_finite())) {
         return Err(source.value(&[Step::Key("simulation"), Step::Key("duration")], format!("{duration} s must be positive")));

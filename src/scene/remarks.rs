@@ -38,6 +38,18 @@ pub(super) fn remarks(system: &System, given: &State, state: &State, assembled: 
             ));
         }
     }
+    for body in bodies() {
+        let Some(flexible) = body.flexible() else { continue };
+        let ratio = flexible.damping.iter().zip(&flexible.stiffness).map(|(c, k)| c / (2.0 * k.sqrt())).fold(0.0, f64::max);
+        // rounding of 2 zeta omega
+        if ratio > 1.0 + 1e-9 && ratio.is_finite() {
+            out.push(format!(
+                "modes of \"{}\" are damped by {} of critical; damping_ratio is a share, 0.005 for half a per cent",
+                body.name,
+                short(ratio)
+            ));
+        }
+    }
     for monitor in monitors {
         if let Monitor::Body { body, stress_limit: Some(_) } = *monitor
             && system.bodies[body].mode_count() == 0
