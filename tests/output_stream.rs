@@ -335,35 +335,6 @@ fn a_killed_run_leaves_a_readable_file() -> Tested {
     Ok(())
 }
 
-/// A run that takes long between output times does not wait for a whole block of them.
-#[test]
-fn rows_do_not_wait_for_their_block_longer_than_a_second() -> Tested {
-    let (system, state, plan) = hub_with_two_panels()?;
-    let folder = tempfile::tempdir()?;
-    let (file, left) = (folder.path().join("run.h5"), folder.path().join("left.h5"));
-    let mut outputs = OutputSet::new(&system, plan)?;
-    outputs.write_results(&file)?;
-    run(&system, &state, &mut outputs, 0.2);
-    std::fs::copy(&file, &left)?;
-    assert_eq!(hdf5::File::open(&left)?.dataset("time")?.shape(), [0]);
-    std::thread::sleep(Duration::from_millis(1_100));
-    let summary = run(&system, &state, &mut outputs, 0.2);
-    let begin = Instant::now();
-    let rows = || -> hdf5::Result<usize> {
-        std::fs::copy(&file, &left).map_err(|e| hdf5::Error::from(e.to_string()))?;
-        Ok(hdf5::File::open(&left)?.dataset("time")?.size())
-    };
-    // between two writes of libhdf5 a copy may be unreadable
-    while rows().unwrap_or(0) < 7 {
-        assert!(begin.elapsed() < Duration::from_secs(10), "the first 7 rows are not on disk");
-        std::thread::sleep(Duration::from_millis(10));
-    }
-    let report = report(outputs, &summary);
-    assert_eq!((report.files[0].frames, &report.files[0].problem), (14, &None));
-    assert_eq!(hdf5::File::open(&file)?.dataset("bodies/left/modal_position")?.shape(), [14, 10]);
-    Ok(())
-}
-
 #[test]
 fn without_a_viewer_connecting_fails_soon_and_says_what_to_do() -> Tested {
     let (system, state, plan) = hub_with_two_panels()?;

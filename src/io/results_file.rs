@@ -1,7 +1,10 @@
 //! Results files: time histories by name in HDF5, schema `pliant-results` 1.0. The layer above says what is in them.
 //!
 //! Every series is a dataset with one row per output time. Rows are appended in blocks; after each block the file is flushed, so that a
-//! run that is killed leaves a readable file with all but the last rows. Texts are of fixed length.
+//! run that is killed leaves a readable file with all but the last blocks. Texts are of fixed length.
+//!
+//! A chunk is written once. One that grew would move in the file, and its old place be given to others before the index on disk says so: a
+//! kill in between would take rows that were there already.
 
 use super::error::ModalFileError;
 use super::guard::GuardedFile;
@@ -16,7 +19,7 @@ use thiserror::Error;
 pub const BLOCK_ROWS: usize = 256;
 /// Least rows per chunk, however wide a row is.
 const LEAST_BLOCK_ROWS: usize = 64;
-/// A block of more than [`LEAST_BLOCK_ROWS`] stays below this (bytes).
+/// A block of more than [`LEAST_BLOCK_ROWS`] takes at most this (bytes).
 const BLOCK_BYTES: usize = 4 << 20;
 /// Shuffled doubles of a motion shrink to three quarters at any level; the first costs least.
 const DEFLATE_LEVEL: u8 = 1;
@@ -124,7 +127,9 @@ impl ResultsFile {
         std::fs::OpenOptions::new().write(true).create(true).truncate(false).open(path).map_err(|e| fail(e.to_string()))?;
         hdf5::silence_errors(true);
         let row = series.iter().map(|s| s.width.unwrap_or(1)).sum::<usize>();
-        let block_rows = (BLOCK_BYTES / (size_of::<f64>() * row.max(1))).clamp(LEAST_BLOCK_ROWS, BLOCK_ROWS);
+        let fitting = (BLOCK_BYTES / (size_of::<f64>() * row.max(1))).clamp(LEAST_BLOCK_ROWS, BLOCK_ROWS);
+        // a power of two, so that readers of BLOCK_ROWS at a time meet whole chunks
+        let block_rows = 1 << fitting.ilog2();
         let made = || -> hdf5::Result<(hdf5::File, Vec<_>)> {
             let file = whole_chunks().create(path)?;
             write_preface(&file, preface)?;
@@ -155,8 +160,8 @@ impl ResultsFile {
         self.block_rows
     }
 
-    /// Appends rows, one after the other, each with the numbers of all series in their order, and brings the file up to date. Blocks that
-    /// end with a chunk, after a multiple of [`Self::block_rows`], cost least.
+    /// Appends rows, one after the other, each with the numbers of all series in their order, and brings the file up to date. All but the
+    /// last append fill chunks, [`Self::block_rows`] rows.
     ///
     /// # Errors
     /// If a write fails.

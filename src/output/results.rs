@@ -17,7 +17,6 @@ use crossbeam_channel::{Receiver, Sender, bounded};
 use nalgebra::Vector6;
 use std::path::{Path, PathBuf};
 use std::thread::JoinHandle;
-use std::time::{Duration, Instant};
 
 /// Name of the schema.
 pub const FORMAT: &str = "pliant-results";
@@ -26,9 +25,6 @@ pub const VERSION: &str = "1.0";
 
 /// Memory (bytes) for blocks on their way to the thread; one more is being filled and one being written.
 const ROOM: usize = 32 << 20;
-
-/// How long rows wait for their block at most: what a killed run loses.
-const HOLD: Duration = Duration::from_secs(1);
 
 /// Writes one results file.
 #[derive(Debug)]
@@ -40,9 +36,6 @@ pub struct ResultsWriter {
     block: Vec<f64>,
     /// Rows of a whole block.
     block_rows: usize,
-    /// Rows so far.
-    rows: usize,
-    handed_over: Instant,
     sender: Sender<Vec<f64>>,
     /// Blocks that were written, to be filled again.
     written: Receiver<Vec<f64>>,
@@ -76,8 +69,7 @@ impl ResultsWriter {
         let thread = std::thread::Builder::new().name("results".into()).spawn(work);
         let thread = thread.map_err(|e| ResultsError::Create { file: path.to_owned(), cause: e.to_string() })?;
         let block = Vec::with_capacity(width * block_rows);
-        let (path, handed_over, quaternions) = (path.to_owned(), Instant::now(), Vec::new());
-        Ok(Self { path, width, block, block_rows, rows: 0, handed_over, sender, written, thread, quaternions })
+        Ok(Self { path: path.to_owned(), width, block, block_rows, sender, written, thread, quaternions: Vec::new() })
     }
 
     /// The path as given.
@@ -142,22 +134,13 @@ impl ResultsWriter {
         row.extend(frame.audit.map(|audit| audit.load));
         debug_assert_eq!(row.len() - start, self.width, "a row has one number per column");
         row.resize(start + self.width, f64::NAN);
-        self.rows += 1;
-        !self.rows.is_multiple_of(self.block_rows) || self.hand_over(Instant::now())
-    }
-
-    /// Hands over rows that have waited long enough for their block; to be called often. False as [`Self::write`].
-    #[must_use]
-    pub fn pass_on(&mut self, now: Instant) -> bool {
-        self.block.is_empty() || now.duration_since(self.handed_over) < HOLD || self.hand_over(now)
-    }
-
-    fn hand_over(&mut self, now: Instant) -> bool {
-        self.handed_over = now;
+        if row.len() < self.width * self.block_rows {
+            return true;
+        }
         let next = self.written.try_recv().unwrap_or_else(|_| Vec::with_capacity(self.width * self.block_rows));
-        let block = std::mem::replace(&mut self.block, next);
+        let full = std::mem::replace(&mut self.block, next);
         self.block.clear();
-        self.sender.send(block).is_ok()
+        self.sender.send(full).is_ok()
     }
 
     /// Waits until all rows are in the file and writes how the run ended; returns the number of rows.

@@ -159,19 +159,6 @@ impl<'s> OutputSet<'s> {
     }
 }
 
-/// Does `work` if there is a file; closes it if that fails.
-#[cfg(feature = "hdf5")]
-fn go_on_writing(
-    results: &mut Option<ResultsWriter>,
-    written: &mut Vec<Written>,
-    time: f64,
-    work: impl FnOnce(&mut ResultsWriter) -> bool,
-) {
-    if results.as_mut().is_some_and(|results| !work(results)) {
-        written.extend(results.take().map(|results| close_results(results, false, time)));
-    }
-}
-
 /// Waits until the file is whole, or says why it is not.
 #[cfg(feature = "hdf5")]
 fn close_results(results: ResultsWriter, completed: bool, end_time: f64) -> Written {
@@ -204,8 +191,6 @@ impl Observer for OutputSet<'_> {
         if let Some(gauge) = &mut self.truncation {
             gauge.follow(step);
         }
-        #[cfg(feature = "hdf5")]
-        go_on_writing(&mut self.results, &mut self.written, step.state.time, |results| results.pass_on(started));
         if let Some(viewer) = &mut self.viewer {
             viewer.pass_on();
         }
@@ -230,7 +215,12 @@ impl Observer for OutputSet<'_> {
             gauge.observe(&self.plan, sample, frame);
         }
         #[cfg(feature = "hdf5")]
-        go_on_writing(&mut self.results, &mut self.written, sample.state.time, |results| results.write(&self.plan, sample, frame));
+        if let Some(results) = &mut self.results
+            && !results.write(&self.plan, sample, frame)
+            && let Some(results) = self.results.take()
+        {
+            self.written.push(close_results(results, false, sample.state.time));
+        }
         if let Some(viewer) = &mut self.viewer {
             let snapshot = Snapshot::of(viewer.hinges(), viewer.closures(), sample, frame, &self.tracker.events);
             viewer.send(snapshot);

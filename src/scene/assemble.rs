@@ -191,8 +191,8 @@ pub fn assemble_document(source: Source, document: toml::Table, overrides: &Over
 
 fn syntax(source: &Source, error: &toml::de::Error) -> SceneError {
     let mut message = error.to_string().trim_end().to_owned();
-    // what only the plan of a campaign has
-    if ["parameter", "samples", "seed"].iter().any(|key| message.contains(&format!("unknown field `{key}`"))) {
+    let plan_keys = ["parameter", "samples", "seed"];
+    if toml::from_str::<toml::Table>(&source.text).is_ok_and(|table| plan_keys.iter().any(|key| table.contains_key(*key))) {
         message +=
             &format!("\nthis looks like the plan of a campaign; run it with its scene: pliant sweep SCENE.toml {}", source.path.display());
     }
